@@ -1,0 +1,53 @@
+# make demo      a pick-and-place cycle on the built-in simulator, over a real pseudo-terminal
+# make test      ruff, mypy and the whole test suite
+# make test-all  the test suite on every Python from 3.11 on that this machine has
+# make format    what ruff can mend
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test test-all check pytest format clean
+
+demo: $(VENV)/.cli
+	$(BIN)/python -m dobot_async demo
+
+test: check pytest
+
+check: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(VENV)/.dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# A Python is on the PATH as python3.N, or among pyenv's.
+test-all:
+	@set -e; for minor in 11 12 13 14 15; do \
+	    python=$$(ls -d $${PYENV_ROOT:-$$HOME/.pyenv}/versions/3.$$minor.*/bin/python 2>/dev/null | tail -n 1); \
+	    if python3.$$minor -c '' 2>/dev/null; then python=python3.$$minor; fi; \
+	    if [ -n "$$python" ]; then \
+	        echo "== Python 3.$$minor"; \
+	        $(MAKE) --no-print-directory pytest PYTHON="$$python" VENV=.venv-3.$$minor; \
+	    fi; \
+	done
+
+pytest: $(VENV)/.dev
+	$(BIN)/python -m pytest -n auto
+
+$(VENV)/.venv:
+	$(PYTHON) -m venv $(VENV)
+	touch $@
+
+$(VENV)/.cli: $(VENV)/.venv pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[cli]'
+	touch $@
+
+$(VENV)/.dev: $(VENV)/.venv pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@ $(VENV)/.cli
+
+clean:
+	rm -rf .venv .venv-3.* build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,75 @@
+"""The whole exception tree. Imports nothing of this package.
+
+    DobotError
+    ├── ConnectFailed    (ConnectionError)   no arm answered behind the URL
+    ├── ConnectionLost   (ConnectionError)   the link broke or was closed
+    ├── ReplyTimeout     (TimeoutError)      the arm did not answer one request in time
+    ├── ProtocolError                        the arm answered something that the layout does not allow
+    ├── CommandRejected                      the arm answered that it will not do it
+    ├── ArmAlarm                             the arm ended the motion with alarms
+    ├── MotionStopped                        a stop or a clear ended the motion
+    └── MotionUnknown                        the motion may or may not run
+
+Wrong arguments are `ValueError` or `TypeError` and are raised before a byte is sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+__all__ = [
+    "ArmAlarm",
+    "CommandRejected",
+    "ConnectFailed",
+    "ConnectionLost",
+    "DobotError",
+    "MotionStopped",
+    "MotionUnknown",
+    "ProtocolError",
+    "ReplyTimeout",
+]
+
+
+class DobotError(Exception):
+    """The root of everything that an arm or its link can do wrong."""
+
+
+class ConnectFailed(DobotError, ConnectionError):
+    """No arm could be reached; the message says what to check."""
+
+
+class ConnectionLost(DobotError, ConnectionError):
+    """The link broke, or was closed, while it was needed."""
+
+
+class ReplyTimeout(DobotError, TimeoutError):
+    """The arm did not answer a request in time; the link itself may still be good."""
+
+
+class ProtocolError(DobotError):
+    """The arm sent something that its protocol does not allow."""
+
+
+class CommandRejected(DobotError):
+    """The arm understood a command and refused it."""
+
+
+class ArmAlarm(DobotError):
+    """The arm raised alarms and ended, or will not run, the motion.
+
+    Attributes:
+        alarms: What is set, each with its code, cause and remedy.
+    """
+
+    def __init__(self, message: str, alarms: Sequence[Any] = ()) -> None:
+        super().__init__(message)
+        self.alarms = tuple(alarms)
+
+
+class MotionStopped(DobotError):
+    """A stop, a clear or the end of the connection's block ended the motion before it was known to be done."""
+
+
+class MotionUnknown(DobotError):
+    """Nothing can tell whether the motion runs; the arm was told to stop."""

@@ -1,0 +1,86 @@
+"""One publisher, any number of readers, nobody held up: `async for event in events`.
+
+Each reader sees what is published after it began to listen. A reader that falls behind loses the oldest events,
+never the newest, so that memory is bounded; its `missed` counts them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from typing import Generic, Self, TypeVar
+from weakref import WeakSet
+
+__all__ = ["Events", "Listener"]
+
+T = TypeVar("T")
+BACKLOG = 256
+
+
+class Events(Generic[T]):
+    """Where events are published; iterating listens from now on."""
+
+    def __init__(self) -> None:
+        self._listeners: WeakSet[Listener[T]] = WeakSet()
+        self._closed = False
+
+    def publish(self, event: T) -> None:
+        """Hands an event to everybody who listens; never waits."""
+        for listener in self._listeners:
+            listener.put(event)
+
+    def close(self) -> None:
+        """Ends every reader's loop once it has read what was published."""
+        self._closed = True
+        for listener in self._listeners:
+            listener.close()
+
+    def __aiter__(self) -> Listener[T]:
+        listener: Listener[T] = Listener(closed=self._closed)
+        self._listeners.add(listener)
+        return listener
+
+
+class Listener(Generic[T]):
+    """One reader of events.
+
+    Attributes:
+        missed: How many events were dropped because this reader was too slow.
+    """
+
+    def __init__(self, *, closed: bool) -> None:
+        self.missed = 0
+        self._closed = closed
+        self._backlog: deque[T] = deque()
+        self._wake: asyncio.Future[None] | None = None
+
+    def put(self, event: T) -> None:
+        """Adds an event, and drops the oldest one from a full backlog."""
+        if len(self._backlog) == BACKLOG:
+            self._backlog.popleft()
+            self.missed += 1
+
+        self._backlog.append(event)
+        self._notify()
+
+    def close(self) -> None:
+        """Lets the reader end."""
+        self._closed = True
+        self._notify()
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> T:
+        while not self._backlog:
+            if self._closed:
+                raise StopAsyncIteration
+
+            self._wake = asyncio.get_running_loop().create_future()
+            await self._wake
+
+        return self._backlog.popleft()
+
+    def _notify(self) -> None:
+        if self._wake and not self._wake.done():
+            self._wake.set_result(None)

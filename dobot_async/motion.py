@@ -1,0 +1,350 @@
+"""The queue of motions, for all families: put, completion, pause, stop. It never learns which arm it drives.
+
+    put --> room? --> executor.push --> Motion (accepted) --+--> done            the arm has executed it
+             ^                                              +--> ArmAlarm        the arm raised alarms
+             `-- left space, counted down, asked at zero    +--> MotionStopped   stop, clear, end of the block
+                                                            +--> MotionUnknown   nothing can tell
+             one poller, only while somebody waits  ------->+--> ConnectionLost  the link is gone
+
+Every Motion ends exactly once. Commands are put in the order of the calls; a full queue makes `put` wait. A ticket that
+the arm has reached is no proof that the motion succeeded, so the alarms are read after it; only then a Motion is done.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator, Coroutine, Generator, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager
+from typing import Any, TypeVar
+
+import anyio
+
+from dobot_async.errors import ArmAlarm, ConnectionLost, DobotError, MotionStopped, MotionUnknown, ReplyTimeout
+from dobot_async.executor import Entry, Executor
+from dobot_async.wire import Command
+
+__all__ = ["Motion", "MotionQueue", "undisturbed"]
+
+T = TypeVar("T")
+Q = TypeVar("Q")
+POLL = 0.004
+ALARM_POLLS = 12  # the alarms are also read at every so many polls, for a motion that an alarm keeps from ending
+SILENCES = 3  # polls in a row that nobody answers, each with its own repetitions, until the arm counts as lost
+
+
+class Motion:
+    """One queued command; awaitable any number of times, by any number of tasks.
+
+    Awaiting it returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or
+    ConnectionLost when it has not. It belongs to its queue: cancelling who waits for it only ends the waiting.
+
+    Attributes:
+        name: The command's name.
+        index: The arm's number for it, None until the arm has accepted it.
+    """
+
+    def __init__(self, queue: MotionQueue, entry: Entry) -> None:
+        self.name = entry.command.name
+        self.moves = entry.command.moves
+        self.index: int | None = None
+        self._queue = queue
+        self._ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._error: DobotError | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether it is known to have ended, well or not. It is found out while somebody awaits a Motion of the arm."""
+        return self._ended.done()
+
+    async def wait(self, timeout: float | None = None) -> None:
+        """Waits as `await motion` does, for at most so many seconds.
+
+        Raises:
+            ReplyTimeout: It has not ended yet; it goes on.
+        """
+        if not self.done:
+            try:
+                with self._queue.watching():
+                    async with asyncio.timeout(timeout):
+                        await asyncio.shield(self._ended)
+            except TimeoutError:
+                raise ReplyTimeout(f"{self} has not ended within {timeout:g} s; it goes on") from None
+
+        if self._error:
+            raise self._error.with_traceback(None)
+
+    def __await__(self) -> Generator[Any, None, None]:
+        return self.wait().__await__()
+
+    def __str__(self) -> str:
+        return self.name if self.index is None else f"{self.name} (index {self.index})"
+
+    def __repr__(self) -> str:
+        state = "failed" if self._error else "done" if self.done else "pending"
+        return f"<Motion {self}: {state}>"
+
+    def end(self, error: DobotError | None = None) -> None:
+        """Called by the queue: how it ended. Only the first call counts."""
+        if not self.done:
+            self._error = error
+            self._ended.set_result(None)
+
+
+class MotionQueue:
+    """What is put here the arm executes in order, each exactly once."""
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self._order = anyio.Lock(fast_acquire=True)
+        self._left = 0
+        self._pending: deque[Motion] = deque()
+        self._entering: dict[Entry, Motion] = {}
+        self._stops = 0
+        self._stopped: DobotError = MotionStopped("the arm was stopped")
+        self._watchers = 0
+        self._poller: asyncio.Task[None] | None = None
+        self._observed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+    @property
+    def pending(self) -> int:
+        """How many accepted commands are not known to have ended."""
+        return len(self._pending)
+
+    async def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
+        """Gives one command to the arm's queue and returns once the arm has accepted it.
+
+        Args:
+            command: A row of the table that may be queued.
+            value: Its parameters.
+            timeout: Seconds to wait for room in the arm's queue; None waits as long as the arm answers.
+
+        Raises:
+            ValueError: The parameters do not fit, or the command cannot be queued.
+            ReplyTimeout: There was no room in time.
+            ArmAlarm: The arm has raised alarms and makes no more room.
+            MotionStopped: The queue was stopped while this waited for room.
+            MotionUnknown: Nothing can tell whether the arm took it.
+            ConnectionLost: The link is gone.
+        """
+        entry = self.prepare(command, value)
+        motion = Motion(self, entry)
+        await self.put_all({entry: motion}, timeout=timeout)
+        return motion
+
+    def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
+        """Returns a checked entry; raises ValueError or TypeError as `put` does."""
+        return self._executor.prepare(command, value)
+
+    async def put_all(self, batch: Mapping[Entry, Motion], *, timeout: float | None = None) -> None:
+        """Gives several commands to the arm's queue with nothing between them; see `put`."""
+        stops = self._stops
+        self._entering.update(batch)
+        entries = list(batch)
+        failure: DobotError = MotionStopped("it was not sent: the call that put it was cancelled")
+        try:
+            async with asyncio.timeout(timeout) as limit:
+                await self._order.acquire()
+
+            try:
+                while entries:
+                    async with asyncio.timeout_at(limit.when()):
+                        await self._room()
+
+                    self._check(stops)
+                    count = min(self._left, len(entries))
+                    await self._executor.push(entries[:count], self._accepted)
+                    del entries[:count]
+            finally:
+                self._order.release()
+        except DobotError as error:
+            failure = error
+            if isinstance(error, MotionUnknown):
+                await self._give_up(error)
+
+            raise
+        except TimeoutError:
+            failure = ReplyTimeout(f"the arm's queue had no room within {timeout:g} s")
+            raise failure from None
+        finally:
+            # What is under way is not forgotten: it ends when it is settled.
+            for entry in entries:
+                if entry not in self._executor.under_way and entry in self._entering:
+                    self._entering.pop(entry).end(failure)
+
+    async def join(self, timeout: float | None = None) -> None:
+        """Returns when all that was put has been executed; raises the first failure among it, or ReplyTimeout."""
+        for motion in list(self._pending):
+            await motion.wait(timeout)
+
+    async def pause(self) -> None:
+        """Lets the arm finish the command that it executes, and then wait; Motions stay pending."""
+        await self._executor.pause()
+
+    async def resume(self) -> None:
+        """Lets a paused arm go on."""
+        await self._executor.resume()
+
+    async def stop(self) -> None:
+        """Stops the arm now, ahead of everything; all pending Motions raise MotionStopped, and the queue is empty."""
+        await undisturbed(self._stop(MotionStopped("the arm was stopped")))
+
+    async def clear(self) -> None:
+        """Throws away all that is queued, the running command included; its Motions raise MotionStopped."""
+        await undisturbed(self._stop(MotionStopped("the arm's queue was cleared"), halt=False))
+
+    def fail(self, error: DobotError) -> None:
+        """Ends all Motions, and the puts that wait for room, with an error."""
+        self._stops += 1
+        self._stopped = error
+        pending, self._pending = self._pending, deque()
+        for motion in pending:
+            motion.end(error)
+
+        for entry in self._executor.under_way:
+            if entry in self._entering:
+                self._entering.pop(entry).end(error)
+
+        self._tell()
+
+    async def aclose(self) -> None:
+        """Ends the poller and all Motions; the arm is left as it is."""
+        self.fail(MotionStopped("the connection's block ended before the motion was known to be done"))
+        if self._poller:
+            self._poller.cancel()
+            await asyncio.wait([self._poller])
+
+    @asynccontextmanager
+    async def exclusively(self) -> AsyncIterator[None]:
+        """While this is entered, nobody else puts anything."""
+        async with self._order:
+            yield
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """While this is entered, the arm is asked how far it is."""
+        self._watchers += 1
+        if self._poller is None or self._poller.done():
+            self._poller = asyncio.create_task(self._poll(), name="dobot_async poller")
+
+        try:
+            yield
+        finally:
+            self._watchers -= 1
+
+    def _accepted(self, entry: Entry, ticket: int | None) -> None:
+        """The arm has taken a command, or is known not to have taken it."""
+        motion = self._entering.pop(entry, None)
+        if ticket is None:
+            if motion:
+                motion.end(MotionStopped("the arm did not take it before the call that put it was cancelled"))
+
+            return
+
+        self._left = max(0, self._left - 1)
+        if motion:
+            motion.index = ticket
+            self._pending.append(motion)
+
+    def _check(self, stops: int) -> None:
+        """Raises if the queue was stopped since it had been stopped so often."""
+        if self._stops != stops:
+            raise self._stopped.with_traceback(None)
+
+    async def _room(self) -> None:
+        """Returns when the arm's queue has room: asked only when what was counted down is used up."""
+        stops = self._stops
+        if not self._left:
+            self._left = await self._executor.left_space()
+
+        while not self._left:
+            with self.watching():
+                await asyncio.shield(self._observed)
+
+            self._check(stops)
+            self._left = await self._executor.left_space()
+
+    async def _stop(self, error: DobotError, *, halt: bool = True) -> None:
+        """Stops, ends all Motions, waits for the put that is under way, and empties the queue behind it."""
+        if halt:
+            await self._executor.halt()
+
+        self.fail(error)
+        async with self._order:
+            await self._executor.reset()
+            self.fail(error)
+            self._left = 0
+
+    async def _give_up(self, error: DobotError) -> None:
+        """Stops the arm because of an error that nobody can mend, as far as the link still allows."""
+        try:
+            await undisturbed(self._stop(error))
+        except DobotError:
+            self.fail(error)
+
+    async def _poll(self) -> None:
+        """Observes the arm while somebody waits."""
+        silences = polls = 0
+        while self._watchers:
+            try:
+                await self._observe(alarms=polls % ALARM_POLLS == 0)
+                silences = 0
+            except ReplyTimeout as error:
+                silences += 1
+                if silences == SILENCES:
+                    self.fail(ConnectionLost(f"the arm no longer answers: {error}"))
+            except MotionUnknown as error:
+                await self._give_up(error)
+            except DobotError as error:
+                self.fail(error)
+
+            polls += 1
+            self._tell()
+            await asyncio.sleep(POLL)
+
+    async def _observe(self, *, alarms: bool) -> None:
+        """Asks the arm how far it is, and ends the Motions that this decides."""
+        if self._executor.under_way and not self._order.locked():
+            async with self._order:
+                await self._executor.settle()
+
+        ticket = await self._executor.completed()
+        reached = [] if ticket is None else [motion for motion in self._pending if (motion.index or 0) <= ticket]
+        if not (reached or alarms):
+            return
+
+        faults = await self._executor.faults()
+        for motion in reached:
+            if not (faults and motion.moves):
+                motion.end()
+
+        while self._pending and self._pending[0].done:
+            self._pending.popleft()
+
+        if faults and any(motion.moves for motion in self._pending):
+            text = "; ".join(map(str, faults))
+            await self._stop(ArmAlarm(f"the arm raised alarms: {text}", faults))
+
+    def _tell(self) -> None:
+        """Wakes those who wait for the next observation."""
+        if not self._observed.done():
+            self._observed.set_result(None)
+
+        self._observed = asyncio.get_running_loop().create_future()
+
+
+async def undisturbed(work: Coroutine[Any, Any, T]) -> T:
+    """Runs work to its end even if the caller is cancelled meanwhile; the cancellation goes on after it."""
+    task = asyncio.create_task(work)
+    cancelled: asyncio.CancelledError | None = None
+    with anyio.CancelScope(shield=True):
+        while not task.done():
+            try:
+                await asyncio.wait([task])
+            except asyncio.CancelledError as error:
+                cancelled = error
+
+    if cancelled:
+        raise cancelled
+
+    return task.result()

@@ -1,0 +1,42 @@
+"""The ways to an arm, chosen by URL; each scheme's module is imported when it is first used."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import cast
+from urllib.parse import urlsplit
+
+from dobot_async.transports.base import Transport
+
+__all__ = ["SCHEMES", "Transport", "open_transport"]
+
+SCHEMES = {
+    "serial": ("dobot_async.transports.serial", "serial:///dev/ttyUSB0, serial://COM3 (?baud=115200)"),
+    "udp": ("dobot_async.transports.network", "udp://192.168.1.20 (port 8899)"),
+    "tcp": ("dobot_async.transports.network", "tcp://host:port"),
+    "sim": ("dobot_async.simulator.endpoints", "sim: (?speed=10&seed=1&loss=0.05&latency=0.01)"),
+}
+
+
+async def open_transport(url: str, *, arm: str) -> Transport:
+    """Opens the way to an arm.
+
+    Args:
+        url: One of the forms in `SCHEMES`.
+        arm: The model that `sim:` is to simulate.
+
+    Raises:
+        ValueError: The URL is none; the message says what is wrong with it.
+        ConnectFailed: Nothing could be opened there; the message says what to check.
+    """
+    try:
+        parts = urlsplit(url)
+    except ValueError as error:
+        raise ValueError(f"{url!r} is not a URL: {error}") from None
+
+    if parts.scheme not in SCHEMES:
+        forms = "; ".join(form for _, form in SCHEMES.values())
+        raise ValueError(f"{url!r} has no scheme that leads to an arm; use one of: {forms}")
+
+    module, _ = SCHEMES[parts.scheme]
+    return cast(Transport, await import_module(module).open_url(parts, arm=arm))

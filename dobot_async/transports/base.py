@@ -1,0 +1,83 @@
+"""What every transport is, and the pieces that they share."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, Protocol
+from urllib.parse import SplitResult, parse_qsl
+
+__all__ = ["MANY", "Transport", "Wrapped", "options"]
+
+MANY = 8
+"""Unanswered requests that a byte stream carries at a time: a handful fits the arm's own input buffer."""
+
+
+class Transport(Protocol):
+    """A way to an arm for bytes, with anyio's verbs and errors. Framing never enters it.
+
+    Attributes:
+        in_flight: How many requests may be unanswered at a time.
+        window: How many queued commands may be unacknowledged at a time, whatever the user asks for.
+    """
+
+    in_flight: int
+    window: int
+
+    async def send(self, data: bytes) -> None:
+        """Sends all bytes of one frame; waits while the line cannot take them.
+
+        Raises:
+            anyio.ClosedResourceError: It was closed on this side.
+            anyio.BrokenResourceError: The other side is gone.
+        """
+
+    async def receive(self) -> bytes:
+        """Returns the next bytes, at least one, cut anywhere.
+
+        Raises:
+            anyio.ClosedResourceError: It was closed on this side.
+            anyio.EndOfStream: The other side ended it.
+            anyio.BrokenResourceError: It broke.
+        """
+
+    async def aclose(self) -> None:
+        """Closes it; may be called again."""
+
+
+class Stream(Protocol):
+    """What anyio's sockets and memory streams have in common."""
+
+    @property
+    def send(self) -> Callable[[bytes], Awaitable[None]]: ...
+
+    @property
+    def receive(self) -> Callable[[], Awaitable[bytes]]: ...
+
+    @property
+    def aclose(self) -> Callable[[], Awaitable[None]]: ...
+
+
+class Wrapped:
+    """An anyio stream as a transport: its own three verbs, and the limits."""
+
+    def __init__(self, stream: Any, *, in_flight: int, window: int) -> None:
+        self.in_flight = in_flight
+        self.window = window
+        self.send: Callable[[bytes], Any] = stream.send
+        self.receive: Callable[[], Any] = stream.receive
+        self.aclose: Callable[[], Any] = stream.aclose
+
+
+def options(url: SplitResult, known: Mapping[str, Callable[[str], Any]]) -> dict[str, Any]:
+    """Returns the options behind the "?" of a URL, converted; raises ValueError that names what is wrong."""
+    found = {}
+    for name, text in parse_qsl(url.query, keep_blank_values=True, strict_parsing=bool(url.query)):
+        if name not in known:
+            raise ValueError(f"{url.geturl()}: unknown option {name!r}; known: {', '.join(known) or 'none'}")
+
+        try:
+            found[name] = known[name](text)
+        except ValueError:
+            raise ValueError(f"{url.geturl()}: {name}={text!r} is not a {known[name].__name__}") from None
+
+    return found

@@ -1,0 +1,201 @@
+"""A serial port through pyserial-asyncio, the only module that knows of it.
+
+What its traps demand: opening blocks, so a thread of its own does it; DTR and RTS are low before the port opens, for
+they reset the board; closing waits for the output no longer than `DRAIN`, then throws the rest away, so that neither
+the loop nor the kernel waits for a line that does not drain; and the transport is aborted exactly once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections.abc import Callable
+from typing import Any
+from urllib.parse import SplitResult
+
+import anyio
+import serial
+from serial_asyncio import connection_for_serial
+
+from dobot_async.errors import ConnectFailed
+from dobot_async.transports.base import MANY, Transport, options
+
+__all__ = ["SerialTransport", "open_url"]
+
+BAUD = 115200
+WINDOW = 16
+DRAIN = 0.5
+BUFFER = 1 << 16
+
+
+async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001
+    """Opens `serial:///dev/ttyUSB0` or `serial://COM3`, with `?baud=` if it is not 115200."""
+    path = url.netloc + url.path
+    baud = options(url, {"baud": int}).get("baud", BAUD)
+    if not path or baud <= 0:
+        raise ValueError(f"{url.geturl()}: expected serial:///dev/ttyUSB0 or serial://COM3, and a baud rate above 0")
+
+    port = serial.serial_for_url(path, baudrate=baud, do_not_open=True, exclusive=True if os.name == "posix" else None)
+    port.dtr = port.rts = False
+    try:
+        await in_thread(port.open, port.close)
+    except (OSError, ValueError) as error:
+        raise ConnectFailed(
+            f"cannot open {path}: {error}; is the arm plugged in, is this its port, may this user open it "
+            "(group dialout), and is no other program using it?"
+        ) from error
+
+    loop = asyncio.get_running_loop()
+    _, transport = await connection_for_serial(loop, SerialTransport, port)
+    await transport.made
+    return transport  # type: ignore[no-any-return]
+
+
+class SerialTransport(asyncio.Protocol):
+    """An open serial port."""
+
+    in_flight = MANY
+    window = WINDOW
+
+    def __init__(self) -> None:
+        loop = asyncio.get_running_loop()
+        self.made: asyncio.Future[None] = loop.create_future()
+        self._loop = loop
+        self._lost: asyncio.Future[None] = loop.create_future()
+        self._cause: BaseException | None = None
+        self._closing = False
+        self._transport: Any = None
+        self._buffer = bytearray()
+        self._arrived: asyncio.Future[None] | None = None
+        self._writable = asyncio.Event()
+        self._writable.set()
+
+    async def send(self, data: bytes) -> None:
+        """Writes one frame; waits while the output is full."""
+        self._check()
+        self._transport.write(data)
+        if not self._writable.is_set():
+            await self._writable.wait()
+            self._check()
+
+    async def receive(self) -> bytes:
+        """Returns what has arrived, at least one byte."""
+        if self._buffer:
+            # A peer that never stops sending must not keep the loop from everybody else.
+            await asyncio.sleep(0)
+
+        while not self._buffer:
+            self._check()
+            self._arrived = self._loop.create_future()
+            await self._arrived
+
+        data = bytes(self._buffer)
+        self._buffer.clear()
+        if not self._lost.done():
+            self._transport.resume_reading()
+
+        return data
+
+    async def aclose(self) -> None:
+        """Closes the port; what cannot be written within half a second is thrown away."""
+        if not self._closing:
+            self._closing = True
+            if not self._lost.done():
+                await self._drain()
+
+            # A transport that closes by itself must not be aborted, unless output keeps it from ending.
+            if not self._lost.done() and (not self._transport.is_closing() or self._transport.get_write_buffer_size()):
+                self._transport.abort()
+
+        await asyncio.shield(self._lost)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Called by pyserial-asyncio, a little after it has returned the transport."""
+        self._transport = transport
+        self.made.set_result(None)
+
+    def data_received(self, data: bytes) -> None:
+        """Keeps what arrives; stops reading while nobody takes it."""
+        self._buffer += data
+        if len(self._buffer) > BUFFER:
+            self._transport.pause_reading()
+
+        self._wake()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Called once, when the port is gone or closed."""
+        self._cause = exc
+        self._lost.set_result(None)
+        self._writable.set()
+        self._wake()
+
+    def pause_writing(self) -> None:
+        """The output is full."""
+        self._writable.clear()
+
+    def resume_writing(self) -> None:
+        """The output has room again."""
+        self._writable.set()
+
+    def _wake(self) -> None:
+        if self._arrived and not self._arrived.done():
+            self._arrived.set_result(None)
+
+    def _check(self) -> None:
+        if self._closing:
+            raise anyio.ClosedResourceError
+
+        if self._lost.done():
+            raise anyio.BrokenResourceError from self._cause
+
+    async def _drain(self) -> None:
+        """Waits for the output for a moment, then throws away what the port did not take."""
+        transport = self._transport
+        transport.set_write_buffer_limits(high=0)
+        try:
+            async with asyncio.timeout(DRAIN):
+                while transport.get_write_buffer_size() and not self._lost.done():
+                    self._writable.clear()
+                    await self._writable.wait()
+        except TimeoutError:
+            transport.serial.reset_output_buffer()
+
+
+async def in_thread(call: Callable[[], None], undo: Callable[[], None]) -> None:
+    """Runs a blocking call in a thread that ends with it; undoes it if the caller is cancelled meanwhile."""
+    loop = asyncio.get_running_loop()
+    done: asyncio.Future[None] = loop.create_future()
+    abandoned = threading.Event()
+
+    def finish(error: Exception | None) -> None:
+        if done.done():
+            return
+
+        if error:
+            done.set_exception(error)
+        else:
+            done.set_result(None)
+
+    def run() -> None:
+        error: Exception | None = None
+        try:
+            call()
+        except Exception as caught:  # noqa: BLE001 - it is raised where the call is awaited
+            error = caught
+
+        if abandoned.is_set():
+            undo()
+        else:
+            loop.call_soon_threadsafe(finish, error)
+
+    thread = threading.Thread(target=run, name="dobot_async open", daemon=True)
+    thread.start()
+    try:
+        await done
+    except asyncio.CancelledError:
+        abandoned.set()
+        undo()
+        raise
+
+    thread.join()
