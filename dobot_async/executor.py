@@ -63,6 +63,9 @@ class Executor(Protocol):
     async def faults(self) -> Sequence[object]:
         """Returns the alarms that keep the arm from moving."""
 
+    async def stands_at(self, entry: Entry) -> bool:
+        """Returns whether the arm stands where a motion leads; False where the motion alone cannot tell."""
+
     async def halt(self) -> None:
         """Stops the arm where it is, ahead of everything else."""
 

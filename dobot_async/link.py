@@ -254,7 +254,7 @@ class Link(Generic[F]):
         return ConnectionLost(f"the connection to {self.url} was lost: {reason}; is the arm powered and the cable in?")
 
     def _overdue(self, name: str, timeout: float) -> ReplyTimeout:
-        return ReplyTimeout(f"no answer to {name} from {self.url} within {timeout:g} s")
+        return ReplyTimeout(f"no answer to {name} from {self.url} within {timeout:.3g} s")
 
     def _end(self, state: LinkState, cause: BaseException | None) -> None:
         """The one door of death; only the first cause counts."""
@@ -301,7 +301,7 @@ class Link(Generic[F]):
             async with asyncio.timeout(timeout):
                 await self._turns.take(key, rank)
         except TimeoutError:
-            raise ReplyTimeout(f"the link to {self.url} was too busy to send {what} within {timeout:g} s") from None
+            raise ReplyTimeout(f"the link to {self.url} was too busy to send {what} within {timeout:.3g} s") from None
 
         if self.state is not LinkState.OPEN:
             self._turns.give(key)
@@ -366,7 +366,7 @@ class Posted(Generic[R]):
                 await self._reply
         except TimeoutError:
             if not self._reply.done() or self._reply.cancelled():
-                raise ReplyTimeout(f"{self._name} was not acknowledged within {timeout:g} s") from None
+                raise ReplyTimeout(f"{self._name} was not acknowledged within {timeout:.3g} s") from None
         finally:
             self.forget()
 

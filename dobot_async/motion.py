@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Coroutine, Generator, Iterator, Mapping
+from collections.abc import AsyncIterator, Coroutine, Generator, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any, TypeVar
 
@@ -40,11 +40,14 @@ class Motion:
     ConnectionLost when it has not. It belongs to its queue: cancelling who waits for it only ends the waiting.
 
     Attributes:
-        name: The command's name.
+        entry: The command.
+        name: Its name.
+        moves: Whether it moves the arm.
         index: The arm's number for it, None until the arm has accepted it.
     """
 
     def __init__(self, queue: MotionQueue, entry: Entry) -> None:
+        self.entry = entry
         self.name = entry.command.name
         self.moves = entry.command.moves
         self.index: int | None = None
@@ -69,7 +72,7 @@ class Motion:
                     async with asyncio.timeout(timeout):
                         await asyncio.shield(self._ended)
             except TimeoutError:
-                raise ReplyTimeout(f"{self} has not ended within {timeout:g} s; it goes on") from None
+                raise ReplyTimeout(f"{self} has not ended within {timeout:.3g} s; it goes on") from None
 
         if self._error:
             raise self._error.with_traceback(None)
@@ -164,7 +167,7 @@ class MotionQueue:
 
             raise
         except TimeoutError:
-            failure = ReplyTimeout(f"the arm's queue had no room within {timeout:g} s")
+            failure = ReplyTimeout(f"the arm's queue had no room within {timeout:.3g} s")
             raise failure from None
         finally:
             # What is under way is not forgotten: it ends when it is settled.
@@ -195,8 +198,7 @@ class MotionQueue:
 
     def fail(self, error: DobotError) -> None:
         """Ends all Motions, and the puts that wait for room, with an error."""
-        self._stops += 1
-        self._stopped = error
+        self._refuse(error)
         pending, self._pending = self._pending, deque()
         for motion in pending:
             motion.end(error)
@@ -264,8 +266,14 @@ class MotionQueue:
             self._check(stops)
             self._left = await self._executor.left_space()
 
+    def _refuse(self, error: DobotError) -> None:
+        """From now on nothing is sent any more that was put before."""
+        self._stops += 1
+        self._stopped = error
+
     async def _stop(self, error: DobotError, *, halt: bool = True) -> None:
         """Stops, ends all Motions, waits for the put that is under way, and empties the queue behind it."""
+        self._refuse(error)
         if halt:
             await self._executor.halt()
 
@@ -318,12 +326,26 @@ class MotionQueue:
             if not (faults and motion.moves):
                 motion.end()
 
+        if faults and any(motion.moves and not motion.done for motion in self._pending):
+            await self._alarmed(reached, faults)
+
         while self._pending and self._pending[0].done:
             self._pending.popleft()
 
-        if faults and any(motion.moves for motion in self._pending):
-            text = "; ".join(map(str, faults))
-            await self._stop(ArmAlarm(f"the arm raised alarms: {text}", faults))
+    async def _alarmed(self, reached: Sequence[Motion], faults: Sequence[object]) -> None:
+        """Stops the arm because of alarms.
+
+        The arm ticks off a motion that fails as it does one that succeeds. Of several that it has ticked off since the
+        alarms were last seen clear, the last has failed; of another, only an arm that stands where it led shows that it
+        has not.
+        """
+        await self._executor.halt()
+        for motion in [motion for motion in reached if motion.moves][:-1]:
+            if await self._executor.stands_at(motion.entry):
+                motion.end()
+
+        text = "; ".join(map(str, faults))
+        await self._stop(ArmAlarm(f"the arm raised alarms: {text}", faults))
 
     def _tell(self) -> None:
         """Wakes those who wait for the next observation."""

@@ -19,7 +19,7 @@ SIZE = 16
 """How many bytes the arm's alarm state has."""
 
 IGNORED = frozenset({0x00, 0x01})
-"""Codes that do not keep the arm from moving: 0x00 is set by every power-up, 0x01 by a command that it does not know."""
+"""Codes that do not keep the arm from moving: every power-up sets 0x00, a command that it does not know 0x01."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -137,17 +137,16 @@ class Magician(Verbs[Awaitable[None]]):
         if window < 1 or queue not in {"fresh", "keep"} or on_error not in {"stop", "leave"}:
             raise ValueError('expected window >= 1, queue "fresh" or "keep", on_error "stop" or "leave"')
 
-        async with asyncio.timeout(timeout) as limit:
-            transport = await opened(url, limit)
-            # From here on every way out closes the transport.
-            link = Link(transport, frame.Parser(), frame.request, url=url, read_only=not control)
-            try:
-                arm = cls(link, window=min(window, transport.window), check_reach=check_reach)
-                await arm._greet(timeout, fresh=control and queue == "fresh")
-            except BaseException:
-                limit.reschedule(None)
-                await link.aclose()
-                raise
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + timeout
+        transport = await opened(url, timeout)
+        link = Link(transport, frame.Parser(), frame.request, url=url, read_only=not control)
+        arm = cls(link, window=min(window, transport.window), check_reach=check_reach)
+        try:
+            await arm._greet(deadline - loop.time(), fresh=control and queue == "fresh")
+        except BaseException:
+            await undisturbed(arm._close())
+            raise
 
         try:
             yield arm
@@ -312,7 +311,7 @@ class Magician(Verbs[Awaitable[None]]):
         except (TimeoutError, asyncio.CancelledError) as error:
             await undisturbed(self.queue.stop())
             if isinstance(error, TimeoutError) and not isinstance(error, DobotError):
-                raise ReplyTimeout(f"{command.name} was not done within {timeout:g} s; the arm was stopped") from None
+                raise ReplyTimeout(f"{command.name} was not done within {timeout:.3g} s; the arm was stopped") from None
 
             raise
 
@@ -344,15 +343,13 @@ class Magician(Verbs[Awaitable[None]]):
         await self.link.aclose()
 
 
-async def opened(url: str, limit: asyncio.Timeout) -> Transport:
-    """Opens the transport within the limit."""
+async def opened(url: str, timeout: float) -> Transport:
+    """Opens the transport in time."""
     try:
-        return await open_transport(url, arm="magician")
-    except asyncio.CancelledError:
-        if limit.expired():
-            raise ConnectFailed(f"{url} could not be opened in time; is the address right?") from None
-
-        raise
+        async with asyncio.timeout(timeout):
+            return await open_transport(url, arm="magician")
+    except TimeoutError:
+        raise ConnectFailed(f"{url} could not be opened within {timeout:.3g} s; is the address right?") from None
 
 
 def silent(link: Link[frame.Frame]) -> ConnectFailed:

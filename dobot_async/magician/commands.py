@@ -16,27 +16,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, TypeVar
 
+from dobot_async.layouts import NOTHING, Bytes, Count, Lenient, Text
 from dobot_async.magician.frame import MAX_PARAMS
 from dobot_async.magician.params import *
-from dobot_async.wire import (
-    NOTHING,
-    Bytes,
-    Command,
-    Count,
-    Layout,
-    Lenient,
-    Number,
-    Queueing,
-    Record,
-    Scalar,
-    Text,
-    f32,
-    flag,
-    u8,
-    u32,
-    u32x3,
-    u64,
-)
+from dobot_async.wire import Command, Layout, Number, Queueing, Record, Scalar, f32, flag, u8, u32, u32x3, u64
 
 Q = TypeVar("Q")
 R = TypeVar("R")

@@ -9,6 +9,7 @@ index tells how many commands the arm took since `last`, and so whether to go on
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, TypeVar
@@ -19,6 +20,7 @@ from dobot_async.link import Link, Posted
 from dobot_async.magician import commands as c
 from dobot_async.magician.alarms import Alarm, decode, faults
 from dobot_async.magician.frame import Frame
+from dobot_async.magician.reach import destination
 from dobot_async.wire import Command, Number, u64
 
 __all__ = ["MagicianExecutor"]
@@ -27,6 +29,7 @@ Q = TypeVar("Q")
 INDEX: Number[int] = Number(u64)
 ACKNOWLEDGE = 0.5
 ATTEMPTS = 4
+ARRIVED = 0.5  # mm and degrees
 
 
 class MagicianExecutor:
@@ -98,6 +101,16 @@ class MagicianExecutor:
     async def faults(self) -> Sequence[Alarm]:
         """Returns the alarms that keep the arm from moving. Manual 2.5.1."""
         return faults(decode(await self._link.request(c.GET_ALARMS_STATE, None)))
+
+    async def stands_at(self, entry: Entry) -> bool:
+        """Returns whether the arm stands where an absolute motion leads."""
+        target = destination(entry.value)
+        if target is None:
+            return False
+
+        pose = await self._link.request(c.GET_POSE, None)
+        here = (pose.j1, pose.j2, pose.j3, pose.j4) if target.joints else (pose.x, pose.y, pose.z, pose.r)
+        return math.dist(here, target.numbers) < ARRIVED
 
     async def halt(self) -> None:
         """Stops the arm where it is, jogs included, ahead of everything else. Manual 2.19.3 and 2.10.4."""

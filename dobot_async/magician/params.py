@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated
 
+from dobot_async.layouts import Bytes, Counted
 from dobot_async.magician.frame import MAX_PARAMS
-from dobot_async.wire import Bytes, Counted, Record, Scalar, f32, f32x4, f32x8, flag, i32, u8, u8x4, u16, u32, u64
+from dobot_async.wire import Record, Scalar, f32, f32x4, f32x8, flag, i32, u8, u8x4, u16, u32, u64
 
 __all__ = [
     "IOADC",

@@ -1,14 +1,30 @@
-"""Which targets of which commands can be checked before they are sent, and how."""
+"""Where commands lead, and whether the arm can go there."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from dobot_async.magician import commands as c
 from dobot_async.magician.kinematics import Kinematics
 
-__all__ = ["check_reach"]
+__all__ = ["Destination", "check_reach", "destination"]
+
+ANGLES = {c.PTPMode.JUMP_ANGLE, c.PTPMode.MOVJ_ANGLE, c.PTPMode.MOVL_ANGLE}
+INCREMENTS = {c.PTPMode.MOVJ_INC, c.PTPMode.MOVL_INC, c.PTPMode.MOVJ_XYZ_INC}
+
+
+class Destination(NamedTuple):
+    """The end of an absolute motion: x, y, z, r, or the four joints."""
+
+    numbers: tuple[float, float, float, float]
+    joints: bool = False
+
+
+def destination(value: Any) -> Destination | None:
+    """Returns where a command leads, None if that depends on where the arm will be, or if it leads nowhere."""
+    find = DESTINATIONS.get(type(value))
+    return find(value) if find else None
 
 
 def check_reach(kinematics: Kinematics, value: Any) -> None:
@@ -16,40 +32,39 @@ def check_reach(kinematics: Kinematics, value: Any) -> None:
 
     Targets alone are checked, not the way there; increments depend on where the arm will be, and are left to it.
     """
-    check = CHECKS.get(type(value))
-    if check:
-        check(kinematics, value)
+    target = destination(value)
+    if target and target.joints:
+        kinematics.check_joints(*target.numbers)
+    elif target:
+        kinematics.check(*target.numbers)
+
+    if isinstance(value, (c.ARCCmd, c.CircleCmd)):
+        via = value.cir_point
+        kinematics.check(via.x, via.y, via.z, via.r)
+
+    if isinstance(value, (c.CPCmd, c.CPLECmd)) and value.cp_mode is c.CPMode.ABSOLUTE:
+        # A continuous path keeps the tool's rotation, which is not known here.
+        kinematics.inverse(value.x, value.y, value.z, 0.0)
 
 
-def check_ptp(kinematics: Kinematics, target: c.PTPCmd | c.PTPWithLCmd | c.PTPPOCmd | c.PTPPOWithLCmd) -> None:
+def of_ptp(value: c.PTPCmd | c.PTPWithLCmd | c.PTPPOCmd | c.PTPPOWithLCmd) -> Destination | None:
     """A PTP command's four numbers are what its mode says."""
-    if target.ptp_mode in ANGLES:
-        kinematics.check_joints(target.x, target.y, target.z, target.r)
-    elif target.ptp_mode not in INCREMENTS:
-        kinematics.check(target.x, target.y, target.z, target.r)
+    if value.ptp_mode in INCREMENTS:
+        return None
+
+    return Destination((value.x, value.y, value.z, value.r), joints=value.ptp_mode in ANGLES)
 
 
-def check_path(kinematics: Kinematics, target: c.CPCmd | c.CPLECmd) -> None:
-    """A continuous path keeps the tool's rotation, which is not known here."""
-    if target.cp_mode is c.CPMode.ABSOLUTE:
-        kinematics.inverse(target.x, target.y, target.z, 0.0)
+def of_arc(value: c.ARCCmd) -> Destination:
+    """An arc ends at its second point; a circle, where it began."""
+    end = value.to_point
+    return Destination((end.x, end.y, end.z, end.r))
 
 
-def check_arc(kinematics: Kinematics, target: c.ARCCmd | c.CircleCmd) -> None:
-    """Both points of an arc are on it."""
-    for point in (target.cir_point, target.to_point):
-        kinematics.check(point.x, point.y, point.z, point.r)
-
-
-ANGLES = {c.PTPMode.JUMP_ANGLE, c.PTPMode.MOVJ_ANGLE, c.PTPMode.MOVL_ANGLE}
-INCREMENTS = {c.PTPMode.MOVJ_INC, c.PTPMode.MOVL_INC, c.PTPMode.MOVJ_XYZ_INC}
-CHECKS: Mapping[type, Callable[[Kinematics, Any], None]] = {
-    c.PTPCmd: check_ptp,
-    c.PTPWithLCmd: check_ptp,
-    c.PTPPOCmd: check_ptp,
-    c.PTPPOWithLCmd: check_ptp,
-    c.CPCmd: check_path,
-    c.CPLECmd: check_path,
-    c.ARCCmd: check_arc,
-    c.CircleCmd: check_arc,
+DESTINATIONS: Mapping[type, Callable[[Any], Destination | None]] = {
+    c.PTPCmd: of_ptp,
+    c.PTPWithLCmd: of_ptp,
+    c.PTPPOCmd: of_ptp,
+    c.PTPPOWithLCmd: of_ptp,
+    c.ARCCmd: of_arc,
 }

@@ -32,7 +32,17 @@ __all__ = ["Activity", "Device", "DeviceOptions", "Executed", "Fault", "Outcome"
 
 @dataclass(slots=True)
 class Active:
-    """A work that goes on. `origin` is `started`, later by all the time for which the arm was frozen."""
+    """A work that goes on.
+
+    Attributes:
+        work: What.
+        index: Its index, if it came through the queue.
+        activity: What its beginning returned.
+        started: When it began.
+        origin: `started`, later by all the time for which the arm was frozen.
+        ends: When it will end.
+        passed: How much of what happens on the way has happened.
+    """
 
     work: Work
     index: int | None
@@ -40,6 +50,13 @@ class Active:
     started: float
     origin: float
     ends: float
+    passed: int = 0
+
+    @property
+    def due(self) -> float:
+        """When the next thing happens with it."""
+        ahead = self.activity.on_the_way
+        return self.origin + ahead[self.passed][0] if self.passed < len(ahead) else self.ends
 
 
 class Device:
@@ -110,6 +127,12 @@ class Device:
         return self._running.work if self._running else None
 
     @property
+    def following(self) -> Work | None:
+        """The work that the queue comes to next, if any; in `begin`, the one behind it."""
+        self.advance()
+        return self._queue[0][1] if self._queue else None
+
+    @property
     def idle(self) -> bool:
         """Whether nothing executes and nothing waits."""
         self.advance()
@@ -175,6 +198,11 @@ class Device:
         self._settle()
         return index
 
+    def skip(self) -> int:
+        """Returns the next index for a command that is not executed, such as one that is only stored."""
+        self._next_index += 1
+        return self._next_index - 1
+
     def start(self) -> None:
         """Lets the queue run."""
         self.advance()
@@ -200,6 +228,14 @@ class Device:
         self._settle()
 
     # What goes on beside the queue.
+
+    def perform(self, work: Work) -> None:
+        """Does now, whatever else goes on, what takes no time and does not move the arm."""
+        self.advance()
+        if self._begin(work, None):
+            self._record(work, None, self._time, "done")
+
+        self._settle()
 
     def begin_aside(self, work: Work) -> bool:
         """Begins a jog or an immediate motion; returns False, and does nothing, if something executes or is frozen.
@@ -309,10 +345,10 @@ class Device:
         if self._begin_next():
             return True
 
-        first = min(self._active(), key=lambda active: active.ends, default=None)
-        if first and first.ends <= until:
-            self._time = max(self._time, first.ends)
-            self._complete(first)
+        first = min(self._active(), key=lambda active: active.due, default=None)
+        if first and first.due <= until:
+            self._time = max(self._time, first.due)
+            self._pass(first)
             return True
 
         for active in self._active():
@@ -352,6 +388,14 @@ class Device:
             duration = 0.0 if activity.ready() else math.inf
 
         return Active(work, index, activity, self._time, self._time, self._time + duration)
+
+    def _pass(self, active: Active) -> None:
+        """Takes a work past the next thing that happens with it."""
+        if active.passed == len(active.activity.on_the_way):
+            self._complete(active)
+        else:
+            active.passed += 1
+            active.activity.on_the_way[active.passed - 1][1]()
 
     def _complete(self, active: Active) -> None:
         """Ends a work that has reached its end."""

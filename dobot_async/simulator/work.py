@@ -7,7 +7,7 @@ No state, no clock, no bytes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -38,6 +38,7 @@ class Activity:
         duration: Seconds; infinity for ever; None until `ready`.
         at: The joints after some seconds, or None if it does not move them. Depends on nothing but the seconds.
         end: What happens at the end, unless it is aborted. May raise Fault.
+        on_the_way: What happens after which seconds, in order, as far as it gets; none after the duration.
         ready: For a duration of None: whether the condition holds. Asked at the beginning, when an input changes, and
             at each advance.
     """
@@ -45,6 +46,7 @@ class Activity:
     duration: float | None = 0.0
     at: Callable[[float], Vector | None] = lambda _: None
     end: Callable[[], None] = lambda: None
+    on_the_way: Sequence[tuple[float, Callable[[], None]]] = ()
     ready: Callable[[], bool] = lambda: True
 
 

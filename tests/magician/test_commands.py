@@ -12,23 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dobot_async.errors import ProtocolError
+from dobot_async.layouts import NOTHING, Bytes, Count, Counted, Lenient, Text
 from dobot_async.magician import commands as c
 from dobot_async.magician import params
 from dobot_async.magician.frame import MAX_PARAMS, Frame, Parser, encode, request
-from dobot_async.wire import (
-    NOTHING,
-    Bytes,
-    Command,
-    Count,
-    Counted,
-    Field,
-    Layout,
-    Lenient,
-    Number,
-    Queueing,
-    Record,
-    Text,
-)
+from dobot_async.wire import Command, Field, Layout, Number, Queueing, Record
 
 Row = Command[Any, Any]
 every_row = pytest.mark.parametrize("row", c.ALL, ids=lambda row: row.name)

@@ -12,28 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dobot_async.errors import ProtocolError
-from dobot_async.wire import (
-    NOTHING,
-    Bytes,
-    Command,
-    Count,
-    Counted,
-    Layout,
-    Lenient,
-    Number,
-    Record,
-    Scalar,
-    Text,
-    f32,
-    f32x2,
-    flag,
-    i32,
-    u8,
-    u8x4,
-    u16,
-    u32,
-    u64,
-)
+from dobot_async.layouts import NOTHING, Bytes, Count, Counted, Lenient, Text
+from dobot_async.wire import Command, Layout, Number, Record, Scalar, f32, f32x2, flag, i32, u8, u8x4, u16, u32, u64
 
 FLOAT32_MAX = 3.4028234663852886e38
 

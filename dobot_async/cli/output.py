@@ -1,0 +1,142 @@
+"""What the commands say: an answer as text or as one JSON object, progress on a terminal, errors on one line.
+
+Only an answer goes to standard output. Progress is drawn there too, and wiped, but only if it is a terminal and no JSON
+was asked for. rich is imported when something is drawn.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
+from typing import Any
+
+import click
+
+from dobot_async.errors import ArmAlarm
+from dobot_async.magician.params import Pose
+
+__all__ = ["Output", "joint_words", "plain", "tool_words", "words"]
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """Where a command speaks.
+
+    Attributes:
+        as_json: Answers are JSON objects, one a line.
+    """
+
+    as_json: bool
+
+    @property
+    def terminal(self) -> bool:
+        """Whether somebody looks at it: progress and live displays may be drawn."""
+        return not self.as_json and sys.stdout is not None and sys.stdout.isatty()
+
+    def answer(self, value: Any, text: str) -> None:
+        """Prints a command's answer: as JSON if that was asked for, else as text."""
+        click.echo(json.dumps(plain(value)) if self.as_json else text)
+
+    def say(self, text: str) -> None:
+        """Prints a line on the way to the answer; nothing of it with JSON."""
+        if not self.as_json:
+            click.echo(text)
+
+    def fail(self, error: Exception) -> None:
+        """Prints what went wrong: a line on standard error, and an object in place of the answer with JSON."""
+        message = " ".join(": ".join([*getattr(error, "__notes__", ()), str(error) or type(error).__name__]).split())
+        click.echo(f"error: {message}", err=True)
+        if self.as_json:
+            alarms = error.alarms if isinstance(error, ArmAlarm) else ()
+            self.answer({"error": type(error).__name__, "message": message, "alarms": alarms}, "")
+
+    @contextmanager
+    def working(self, what: str) -> Iterator[None]:
+        """Shows on a terminal that something goes on, for the length of a block."""
+        if not self.terminal:
+            yield
+            return
+
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+
+        with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), transient=True) as bar:
+            bar.add_task(what, total=None)
+            yield
+
+    @contextmanager
+    def counting(self, what: str, total: int) -> Iterator[Callable[[int], None]]:
+        """Shows on a terminal how much of something is done, for the length of a block; yields what to tell it by."""
+        if not self.terminal:
+            yield lambda _: None
+            return
+
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+
+        columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+        with Progress(*columns, transient=True) as bar:
+            task = bar.add_task(what, total=total)
+            yield lambda done: bar.update(task, completed=done)
+
+    @contextmanager
+    def panel(self) -> Iterator[Callable[[Mapping[str, str]], None]]:
+        """Draws named lines in place on a terminal, for the length of a block; yields what to draw them with."""
+        from rich.live import Live  # noqa: PLC0415
+        from rich.table import Table  # noqa: PLC0415
+
+        def draw(rows: Mapping[str, str]) -> None:
+            table = Table(show_header=False)
+            for name, text in rows.items():
+                table.add_row(name, text)
+
+            live.update(table, refresh=True)
+
+        with Live(auto_refresh=False) as live:
+            yield draw
+
+
+def plain(value: Any) -> Any:
+    """Returns a value as JSON can hold it: dataclasses as objects, enums by name, bytes as hex."""
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+
+    if isinstance(value, dict):
+        return {key: plain(each) for key, each in value.items()}
+
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+
+    if isinstance(value, Enum):
+        return value.name
+
+    if isinstance(value, bytes):
+        return value.hex(" ")
+
+    # JSON has no word for these.
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def words(value: Any) -> str:
+    """Returns a value on one line, as people read it."""
+    value = plain(value)
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {words(each)}" for name, each in value.items()) or "nothing"
+
+    if isinstance(value, list):
+        return f"({', '.join(map(words, value))})" if value else "none"
+
+    return "nothing" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def tool_words(pose: Pose) -> str:
+    """Returns where the tool is, mm and degrees."""
+    return "  ".join(f"{axis} {getattr(pose, axis):.2f}" for axis in "xyzr")
+
+
+def joint_words(pose: Pose) -> str:
+    """Returns the joints, degrees."""
+    return "  ".join(f"{joint} {getattr(pose, joint):.2f}" for joint in ("j1", "j2", "j3", "j4"))

@@ -1,0 +1,147 @@
+"""One run of the command line: which arm, how it is reached, what signals do.
+
+    command --> Session.ask --> run (signals cancel it) --> Magician.connect --> question(arm) --> answer
+
+A signal cancels the work; the connection's block then stops the arm on its way out, however often the signal comes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from contextlib import asynccontextmanager, nullcontext, suppress
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar
+
+import click
+
+from dobot_async.cli.output import Output
+from dobot_async.cli.trace import Trace, tracing
+from dobot_async.link import Link
+from dobot_async.magician.arm import Magician
+from dobot_async.magician.frame import Frame
+from dobot_async.transports import SCHEMES
+
+__all__ = ["ARMS", "Interrupted", "Session", "run"]
+
+T = TypeVar("T")
+
+ARMS = {"magician": Magician}
+"""The families, by the words of `--arm`."""
+
+# A terminal that is closed must not leave an arm moving, either.
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
+class Interrupted(Exception):
+    """A signal ended the work, and everything was closed; `number` is the signal's."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+@dataclass(slots=True)
+class Session:
+    """What the options before the command say.
+
+    Attributes:
+        url: Of the arm, None if none was given.
+        arm: One of `ARMS`.
+        trace: The file for every frame, "-" for standard error.
+        output: Where to speak.
+        commanding: Whether an arm is held that stops if the work is interrupted.
+    """
+
+    url: str | None
+    arm: str
+    trace: str | None
+    output: Output
+    commanding: bool = False
+
+    def ask(
+        self,
+        question: Callable[[Magician], Awaitable[T]],
+        *,
+        control: bool = True,
+        queue: Literal["fresh", "keep"] = "fresh",
+        on_error: Literal["stop", "leave"] = "stop",
+    ) -> T:
+        """Connects, as `Magician.connect` does, and returns what the arm answers to one question."""
+
+        async def asked() -> T:
+            async with self.connect(control=control, queue=queue, on_error=on_error) as arm:
+                return await question(arm)
+
+        return run(asked())
+
+    @asynccontextmanager
+    async def connect(
+        self,
+        url: str | None = None,
+        *,
+        control: bool = True,
+        queue: Literal["fresh", "keep"] = "fresh",
+        on_error: Literal["stop", "leave"] = "stop",
+    ) -> AsyncIterator[Magician]:
+        """Connects to the session's arm, or to a URL, with the trace that was asked for."""
+        url = url or self.url
+        if not url:
+            forms = "; ".join(form for _, form in SCHEMES.values())
+            raise click.UsageError(f"which arm? Give --url or set DOBOT_URL, to one of: {forms}")
+
+        with tracing(self.trace) if self.trace else nullcontext() as trace:
+            kind = traced(trace) if trace else ARMS[self.arm]
+            async with kind.connect(url, control=control, queue=queue, on_error=on_error) as arm:
+                self.commanding = control and on_error == "stop"
+                yield arm
+
+
+def traced(trace: Trace) -> type[Magician]:
+    """Returns a Magician whose link tells a trace of every frame, those of the greeting included."""
+
+    class Traced(Magician):
+        def __init__(self, link: Link[Frame], **options: Any) -> None:
+            super().__init__(link, **options)
+            link.trace = trace
+
+    return Traced
+
+
+def run(work: Coroutine[Any, Any, T]) -> T:
+    """Runs work to its end and returns its result.
+
+    Raises:
+        Interrupted: SIGINT, SIGTERM or SIGHUP ended it.
+        click.UsageError: The library refused an argument, or the URL.
+    """
+    received: list[int] = []
+
+    async def cancellable() -> T:
+        loop = asyncio.get_running_loop()
+        task = asyncio.current_task()
+        assert task
+
+        def cancel(number: int) -> None:
+            received.append(number)
+            task.cancel()
+
+        for number in SIGNALS:
+            # Whoever started this with a signal ignored (nohup, a shell's background) wants it ignored.
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                with suppress(NotImplementedError):
+                    loop.add_signal_handler(number, cancel, number)
+
+        return await work
+
+    try:
+        return asyncio.run(cancellable())
+    except BaseException as error:
+        if received:
+            raise Interrupted(received[0]) from None
+
+        if isinstance(error, ValueError):
+            raise click.UsageError(str(error)) from error
+
+        raise

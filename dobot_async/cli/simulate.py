@@ -1,0 +1,66 @@
+"""`simulate`: a simulated arm that other programs can connect to."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import click
+
+from dobot_async.cli.session import ARMS, Session, run
+
+__all__ = ["simulate"]
+
+FAULTS = {
+    "loss": "Probability that a message is lost.",
+    "corrupt": "Probability that one of its bytes is changed.",
+    "dup": "Probability that it arrives twice.",
+    "split": "Probability that it arrives in two parts.",
+    "noise": "Probability that junk comes before it.",
+}
+DELAYS = {"latency": "Seconds that a message takes.", "jitter": "Seconds that it may take on top, at random."}
+
+
+def faults(command: click.decorators.FC) -> click.decorators.FC:
+    """Adds the options for a bad line."""
+    for name, text in reversed(DELAYS.items()):
+        command = click.option(f"--{name}", type=click.FloatRange(0), default=0.0, help=text)(command)
+
+    for name, text in reversed(FAULTS.items()):
+        command = click.option(f"--{name}", type=click.FloatRange(0, 1), default=0.0, help=text)(command)
+
+    return command
+
+
+@click.command()
+@click.option("--arm", type=click.Choice(list(ARMS)), help="Which arm. Default: that of the option before the command.")
+@click.option(
+    "--listen",
+    default="pty",
+    show_default=True,
+    metavar="WHERE",
+    help="pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0; port 0 takes a free one.",
+)
+@click.option("--speed", type=click.FloatRange(0, min_open=True), default=1.0, help="Simulated seconds per second.")
+@click.option("--seed", type=int, help="Of the faults, to have the same ones again.")
+@faults
+@click.pass_obj
+def simulate(session: Session, /, arm: str | None, listen: str, speed: float, seed: int | None, **line: float) -> None:
+    """Simulate an arm until Ctrl-C.
+
+    The first line of the output is the URL to connect to.
+    """
+    run(serve(session, arm or session.arm, listen=listen, speed=speed, seed=seed, line=line))
+
+
+async def serve(session: Session, arm: str, *, listen: str, line: dict[str, Any], **details: Any) -> None:
+    """Runs the simulator until it is cancelled."""
+    from dobot_async.simulator import Faults  # noqa: PLC0415 - the other commands start without it
+    from dobot_async.simulator import simulate as simulated  # noqa: PLC0415
+
+    if listen == "memory":
+        raise click.UsageError("memory is of no use to other programs; use pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0")
+
+    async with simulated(arm, listen=listen, faults=Faults(**line), **details) as simulation:
+        session.output.answer({"url": simulation.url}, simulation.url)
+        await asyncio.Event().wait()

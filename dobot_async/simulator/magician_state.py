@@ -1,0 +1,165 @@
+"""What a simulated Magician remembers beside its pose: registers, motors, lost steps. Knows no bytes and no motion.
+
+What a Set row of the command table wrote is its register, kept under the row's ID. Registers of pins and ports are kept
+apart by address. Two tables say what stands in them: FLASH when the arm is made, POWER_UP whenever it is switched on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from dobot_async.magician import commands as c
+from dobot_async.magician.kinematics import JointLimits, Joints, Kinematics
+from dobot_async.wire import Command
+
+__all__ = ["HOME_JOINTS", "HOME_POINT", "Motor", "State"]
+
+Q = TypeVar("Q")
+
+HOME_JOINTS = Joints(0.0, 45.0, 45.0, 0.0)
+HOME_POINT = c.HOMEParams(*Kinematics().forward(*HOME_JOINTS))
+"""What HOMEParams are until somebody sets them: the home joints, with the default end effector."""
+
+FLASH: Mapping[Command[Any, None], Any] = {
+    c.SET_DEVICE_SN: "DTSIM00000000001",
+    c.SET_DEVICE_NAME: "Dobot Magician",
+    c.SET_ANGLE_SENSOR_STATIC_ERROR: c.AngleSensorStaticError(0, 0),
+    c.SET_ANGLE_SENSOR_COEF: c.AngleSensorCoef(1, 1),
+    c.SET_BASE_DECODER_STATIC_ERROR: 0.0,
+    c.SET_WIFI_CONFIG_MODE: False,
+    c.SET_WIFI_SSID: "",
+    c.SET_WIFI_PASSWORD: "",
+    c.SET_WIFI_IP_ADDRESS: c.WIFIIPAddress(dhcp=True),
+    c.SET_WIFI_NETMASK: c.WIFINetmask((255, 255, 255, 0)),
+    c.SET_WIFI_GATEWAY: c.WIFIGateway((0, 0, 0, 0)),
+    c.SET_WIFI_DNS: c.WIFIDNS((0, 0, 0, 0)),
+}
+"""What the arm keeps without power."""
+
+POWER_UP: Mapping[Command[Any, None], Any] = {
+    c.SET_DEVICE_WITH_L: c.DeviceWithL(is_with_l=False),
+    c.SET_HOME_PARAMS: HOME_POINT,
+    c.SET_HHT_TRIG_MODE: c.HHTTrigMode.TRIGGERED_ON_KEY_RELEASED,
+    c.SET_HHT_TRIG_OUTPUT_ENABLED: False,
+    c.SET_ARM_ORIENTATION: c.ArmOrientation.LEFTY,
+    c.SET_END_EFFECTOR_PARAMS: c.EndEffectorParams(59.7),
+    c.SET_END_EFFECTOR_LASER: c.EndEffectorLaser(is_ctrl_enabled=False, is_on=False),
+    c.SET_END_EFFECTOR_SUCTION_CUP: c.EndEffectorSuctionCup(is_ctrl_enabled=False, is_sucked=False),
+    c.SET_END_EFFECTOR_GRIPPER: c.EndEffectorGripper(is_ctrl_enabled=False, is_gripped=False),
+    c.SET_JOG_JOINT_PARAMS: c.JOGJointParams((15, 15, 15, 15), (100, 100, 100, 100)),
+    c.SET_JOG_COORDINATE_PARAMS: c.JOGCoordinateParams((60, 60, 60, 60), (200, 200, 200, 200)),
+    c.SET_JOG_COMMON_PARAMS: c.JOGCommonParams(100, 100),
+    c.SET_JOGL_PARAMS: c.JOGLParams(60, 200),
+    c.SET_PTP_JOINT_PARAMS: c.PTPJointParams((200, 200, 200, 200), (200, 200, 200, 200)),
+    c.SET_PTP_COORDINATE_PARAMS: c.PTPCoordinateParams(200, 200, 200, 200),
+    c.SET_PTP_JUMP_PARAMS: c.PTPJumpParams(20, 100),
+    c.SET_PTP_COMMON_PARAMS: c.PTPCommonParams(50, 50),
+    c.SET_PTPL_PARAMS: c.PTPLParams(200, 200),
+    c.SET_PTP_JUMP2_PARAMS: c.PTPJump2Params(20, 20, 100),
+    c.SET_CP_PARAMS: c.CPParams(100, 100, 100),
+    c.SET_CPR_HOLD_ENABLE: False,
+    c.SET_CP_COMMON_PARAMS: c.CPCommonParams(100, 100),
+    c.SET_ARC_PARAMS: c.ARCParams(200, 200, 200, 200),
+    c.SET_ARC_COMMON_PARAMS: c.ARCCommonParams(50, 50),
+    c.SET_COLOR_SENSOR: c.ColorSensor(enable=False, port=c.ColorPort.GP1),
+    c.SET_LOST_STEP_PARAMS: 5.0,
+    c.SET_UART4_PERIPHERALS_ENABLE: False,
+}
+"""What the arm forgets without power. Velocities are what scripts for the Magician commonly set, jogs the Lite's."""
+
+PINS: Mapping[Command[Any, None], Callable[[int], Any]] = {
+    c.SET_IO_MULTIPLEXING: lambda address: c.IOMultiplexing(address, c.IOFunction.DUMMY),
+    c.SET_IODO: lambda address: c.IODO(address, 0),
+    c.SET_IOPWM: lambda address: c.IOPWM(address, 10, 0),
+    c.SET_INFRARED_SENSOR: lambda port: c.InfraredSensor(enable=False, port=c.InfraredPort(port)),
+}
+"""Registers that each pin (1 to 20) or port has for itself, and what is in them after power-up."""
+
+SLOTS = {c.SET_IO_MULTIPLEXING: "address", c.SET_IODO: "address", c.SET_IOPWM: "address", c.SET_INFRARED_SENSOR: "port"}
+
+
+class Motor:
+    """One of the two steppers.
+
+    Attributes:
+        speed: Pulses/s; negative backwards.
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self.speed = 0
+        self._now = now
+        self._since = now()
+        self._pulses = 0.0
+
+    @property
+    def pulses(self) -> int:
+        """Pulses so far, those backwards subtracted."""
+        return round(self._pulses + self.speed * (self._now() - self._since))
+
+    def run(self, speed: int) -> None:
+        """Goes on at a speed from now on; 0 stops."""
+        now = self._now()
+        self._pulses += self.speed * (now - self._since)
+        self._since, self.speed = now, speed
+
+
+class State:
+    """The memory of one arm.
+
+    Attributes:
+        limits: How far its joints go.
+        motors: The two steppers.
+        lost_steps: By how many degrees each joint stands elsewhere than the arm believes.
+        levelled: The precision of the last levelling, 0 before it.
+    """
+
+    def __init__(self, now: Callable[[], float], limits: JointLimits) -> None:
+        self.limits = limits
+        self.motors = (Motor(now), Motor(now))
+        self.lost_steps = [0.0, 0.0, 0.0, 0.0]
+        self.levelled = 0.0
+        self._registers = {(row.id, 0): value for row, value in FLASH.items()}
+        self.power_up()
+
+    def power_up(self) -> None:
+        """Forgets all that is not in flash, and stands still."""
+        kept = {row.id for row in FLASH}
+        self._registers = {key: value for key, value in self._registers.items() if key[0] in kept}
+        self._registers |= {(row.id, 0): value for row, value in POWER_UP.items()}
+        self._lift: c.PTPJumpParams | c.PTPJump2Params = self.get(c.SET_PTP_JUMP_PARAMS)
+        self.levelled = 0.0
+        for motor in self.motors:
+            motor.run(0)
+
+    def get(self, row: Command[Q, None], slot: int = 0) -> Q:
+        """Returns what a Set row wrote last, or what is there without it; `slot` is the address of a pin or port."""
+        value: Q | None = self._registers.get((row.id, slot))
+        return PINS[row](slot) if value is None else value
+
+    def set(self, row: Command[Q, None], value: Q) -> None:
+        """Does what a Set row does that takes no time."""
+        slot = getattr(value, SLOTS[row]) if row in SLOTS else 0
+        self._registers[row.id, slot] = value
+        if isinstance(value, (c.PTPJumpParams, c.PTPJump2Params)):
+            self._lift = value
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """The geometry with the end effector that is set."""
+        bias = self.get(c.SET_END_EFFECTOR_PARAMS)
+        return Kinematics(bias.x_bias, bias.y_bias, bias.z_bias, self.limits)
+
+    @property
+    def has_rail(self) -> bool:
+        """Whether the arm was told that it stands on a rail."""
+        return self.get(c.SET_DEVICE_WITH_L).is_with_l
+
+    @property
+    def lift(self) -> tuple[float, float, float]:
+        """How far a jump lifts at its start and at its end, and its zLimit: of the parameters that were set last."""
+        match self._lift:
+            case c.PTPJumpParams(height, limit):
+                return height, height, limit
+            case c.PTPJump2Params(start, end, limit):
+                return start, end, limit
