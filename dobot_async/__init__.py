@@ -23,6 +23,7 @@ from dobot_async.magician.effectors import Gripper, Laser, Pen, SuctionCup
 from dobot_async.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.magician.params import (
     ColorPort,
+    EndEffectorParams,
     HHTTrigMode,
     InfraredPort,
     IOFunction,
@@ -44,6 +45,7 @@ __all__ = [
     "ConnectionLost",
     "DeviceInfo",
     "DobotError",
+    "EndEffectorParams",
     "Gripper",
     "HHTTrigMode",
     "IOFunction",

@@ -18,7 +18,7 @@ def main() -> None:
         sys.exit(USAGE)
 
     try:
-        from dobot_async.cli.main import cli  # noqa: PLC0415 - there is nothing to import without the extra
+        from dobot_async.cli.main import cli
 
         cli(prog_name="dobot-async")
     except KeyboardInterrupt:

@@ -52,7 +52,7 @@ class Listener(Generic[T]):
         self.missed = 0
         self._closed = closed
         self._backlog: deque[T] = deque()
-        self._wake: asyncio.Future[None] | None = None
+        self._news = asyncio.Event()
 
     def put(self, event: T) -> None:
         """Adds an event, and drops the oldest one from a full backlog."""
@@ -61,12 +61,12 @@ class Listener(Generic[T]):
             self.missed += 1
 
         self._backlog.append(event)
-        self._notify()
+        self._news.set()
 
     def close(self) -> None:
         """Lets the reader end."""
         self._closed = True
-        self._notify()
+        self._news.set()
 
     def __aiter__(self) -> Self:
         return self
@@ -76,11 +76,7 @@ class Listener(Generic[T]):
             if self._closed:
                 raise StopAsyncIteration
 
-            self._wake = asyncio.get_running_loop().create_future()
-            await self._wake
+            self._news.clear()
+            await self._news.wait()
 
         return self._backlog.popleft()
-
-    def _notify(self) -> None:
-        if self._wake and not self._wake.done():
-            self._wake.set_result(None)

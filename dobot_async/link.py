@@ -15,6 +15,7 @@ from __future__ import annotations
 import asyncio
 import enum
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
@@ -35,6 +36,7 @@ Q = TypeVar("Q")
 ATTEMPTS = 3
 IMMEDIATE_RANK, QUEUED_RANK = 0, 1
 CLOSE_TIMEOUT = 2.0
+HURRY = 0.05  # seconds that an answer is waited for after the one before it was swallowed in its place, or so it seems
 
 
 class Frame(Keyed, Protocol):
@@ -186,14 +188,17 @@ class Link(Generic[F]):
             return decoded
 
         self._check()
+        waiter = self._pending.expect(frame.key, accept)
         if not urgent:
             await self._turn(frame.key, IMMEDIATE_RANK, timeout, command.name)
 
         try:
-            return await self._exchange(frame, accept, command.name, timeout, attempts)
+            answer: R = await self._exchange(frame, waiter, command.name, timeout, attempts)
         finally:
             if not urgent:
-                self._turns.give(frame.key)
+                self._turns.give(frame.key, quiet=waiter.quiet)
+
+        return answer
 
     async def post(self, frame: F, accept: Callable[[F], R], *, name: str, timeout: float) -> Posted[R]:
         """Sends the frame of a queued command; its answer is awaited with the `Posted` that is returned.
@@ -228,7 +233,7 @@ class Link(Generic[F]):
         """Returns what was delivered, or raises ConnectionLost if it was the end of the link."""
         value = reply.result()
         if isinstance(value, ConnectionLost):
-            raise self._lost() from value
+            raise self._lost() from self._cause
 
         return value
 
@@ -237,8 +242,10 @@ class Link(Generic[F]):
         with anyio.CancelScope(shield=True), anyio.move_on_after(CLOSE_TIMEOUT, shield=True):
             self._end(LinkState.CLOSED, None)
             self._reader.cancel()
-            await asyncio.wait([self._reader])
-            await self._transport.aclose()
+            try:
+                await asyncio.wait([self._reader])
+            finally:
+                await self._transport.aclose()
 
     def _check(self) -> None:
         """Raises ConnectionLost if the link is no longer open."""
@@ -265,35 +272,54 @@ class Link(Generic[F]):
         self._pending.fail(self._lost())
         self.events.close()
 
-    async def _exchange(self, frame: F, accept: Callable[[F], R], name: str, timeout: float, attempts: int) -> R:
-        """Sends a frame, again if it has to be, and returns what `accept` makes of its answer."""
-        with self._pending.expect(frame.key, accept) as waiter:
+    async def _exchange(self, frame: F, waiter: Waiter[F], name: str, timeout: float, attempts: int) -> Any:
+        """Sends a frame, again if it has to be, and returns what its waiter makes of the answer."""
+        started = self._loop.time()
+        with waiter:
             for attempt in range(attempts):
-                reply: asyncio.Future[R] = self._loop.create_future()
-                waiter.listen(partial(deliver, reply))
-                if attempt:
-                    self._receive(self._parser.resync())
+                until = started + timeout * (attempt + 1) / attempts
+                hurried = True
+                while hurried:
+                    reply, hurried = await self._ask(frame, waiter, until, repeatable=attempts > 1)
+                    if reply.done() and not reply.cancelled():
+                        return self.answer(reply)
 
-                if not reply.done():
-                    waiter.sent()
-                    self._stats.sent += 1
-                    self._stats.repeated += attempt > 0
-
-                try:
-                    async with asyncio.timeout(timeout / attempts):
-                        await self._send(frame)
-                        await reply
-                except TimeoutError:
-                    if not reply.done() or reply.cancelled():
-                        continue
-
-                return self.answer(reply)
-
-        self._stats.timeouts += 1
         if waiter.misfit:
             raise ProtocolError(f"{name}: the arm's answer does not fit: {waiter.misfit}")
 
+        self._stats.timeouts += 1
         raise self._overdue(name, timeout)
+
+    async def _ask(
+        self, frame: F, waiter: Waiter[F], until: float, *, repeatable: bool
+    ) -> tuple[asyncio.Future[Any], bool]:
+        """Sends a frame once; returns its answer, if one came in time, and whether to ask again before that time."""
+        self._check()
+        reply = self._listen(waiter)
+        self._stats.sent += 1
+        self._stats.repeated += waiter.repeats
+        waiter.sent()
+        with suppress(TimeoutError):
+            async with asyncio.timeout_at(until) as limit:
+                if repeatable:
+                    waiter.hurry = partial(bring_forward, limit, self._loop)
+
+                await self._send(frame)
+                await reply
+
+        hurried = limit.when() != until
+        if not hurried and (not reply.done() or reply.cancelled()):
+            # The answer may have come inside of a frame that never ended.
+            reply = self._listen(waiter)
+            self._receive(self._parser.resync())
+
+        return reply, hurried
+
+    def _listen(self, waiter: Waiter[F]) -> asyncio.Future[Any]:
+        """What the waiter's next answer is delivered to."""
+        reply: asyncio.Future[Any] = self._loop.create_future()
+        waiter.listen(partial(deliver, reply))
+        return reply
 
     async def _turn(self, key: Hashable, rank: int, timeout: float, what: str) -> None:
         """Waits for the turn of a request, no longer than its own timeout."""
@@ -378,6 +404,13 @@ class Posted(Generic[R]):
         if give_turn:
             self._waiter.__exit__()
             give_turn()
+
+
+def bring_forward(limit: asyncio.Timeout, loop: asyncio.AbstractEventLoop) -> None:
+    """Shortens a wait to `HURRY`, if it goes on longer."""
+    when = limit.when()
+    if when is not None and not limit.expired():
+        limit.reschedule(min(when, loop.time() + HURRY))
 
 
 def deliver(reply: asyncio.Future[Any], value: Any) -> None:

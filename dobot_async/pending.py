@@ -3,20 +3,25 @@
 The protocols have no sequence numbers, so a reply is matched by its key (the command's ID), by its layout, and by its
 place in line: replies of one key come in the order of their requests.
 
-    expect --> WAITING --reply--> answered (and owed one reply less)
-                  |
-                  `--timeout, cancellation--> TOMBSTONE --reply or `linger` seconds--> gone
+    expect --> WAITING --reply--> answered, and owed no reply more --> gone
+                  |                 `--it was repeated, and is still owed one--.
+                  `--timeout, cancellation--> TOMBSTONE <----------------------'
+                                                  `--replies, or time--> gone
 
 A tombstone stands in line for the replies that a request is still owed, and swallows them. Without it a late reply
 would answer the next request of its key with wrong data; with it, at the worst, a good reply is swallowed in the place
-of a lost one and its request has to be sent again. A reply later than `linger` seconds after its request is outside of
-this promise.
+of a lost one. Then its request is told to hurry, that is to ask again soon, and is itself owed one reply too many. So
+that this debt is not handed on for ever, a request that was answered and repeated only shortly before asks for `quiet`:
+the next of its key waits for that long, and what has not come by then counts as lost.
+
+Outside of this promise are a reply later than `linger` seconds after its request, and one that comes more than `SPREAD`
+seconds later than the replies to the same request's other repetitions.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from typing import Any, Generic, Protocol, Self, TypeVar
 
 from dobot_async.errors import ProtocolError
@@ -24,6 +29,8 @@ from dobot_async.errors import ProtocolError
 __all__ = ["LINGER", "Keyed", "Pending", "Waiter"]
 
 LINGER = 3.0
+SPREAD = 0.2
+QUIET_LIMIT = 0.5  # who would need more quiet than this leaves a tombstone instead
 
 
 class Keyed(Protocol):
@@ -63,7 +70,10 @@ class Pending(Generic[F]):
     def resolve(self, frame: F) -> bool:
         """Gives a frame to the first in its line whom it fits; False if nobody waits for it."""
         line = self._line(frame.key)
-        for waiter in line:
+        for place, waiter in enumerate(line):
+            if waiter.owed <= 0:
+                continue
+
             try:
                 value = waiter.accept(frame)
             except ProtocolError as error:
@@ -73,8 +83,10 @@ class Pending(Generic[F]):
             waiter.owed -= 1
             if waiter.deliver:
                 waiter.answer(value)
-            elif waiter.owed <= 0:
-                line.remove(waiter)
+            else:
+                hurry_first(line[place + 1 :])
+                if waiter.owed <= 0:
+                    self._remove(waiter)
 
             return True
 
@@ -85,6 +97,7 @@ class Pending(Generic[F]):
         lines, self._lines = self._lines, {}
         for line in lines.values():
             for waiter in line:
+                waiter.owed = 0
                 waiter.answer(error)
 
     def __len__(self) -> int:
@@ -97,22 +110,33 @@ class Pending(Generic[F]):
 
     def leave(self, waiter: Waiter[F]) -> None:
         """Takes a waiter out of its line, or leaves it there as a tombstone while replies are owed to it."""
-        waiter.deliver = None
-        line = self._line(waiter.key)
-        if waiter in line and not (waiter.tombstone and waiter.owed > 0):
-            line.remove(waiter)
+        waiter.deliver = waiter.hurry = None
+        if not (waiter.tombstone and waiter.owed > 0):
+            self._remove(waiter)
+            return
 
-        if not line:
-            self._lines.pop(waiter.key, None)
+        needed = waiter.sent_at - waiter.first_sent_at + SPREAD
+        if waiter.answered and needed <= QUIET_LIMIT:
+            waiter.quiet = needed
+            waiter.expires_at = self.clock() + needed
+        else:
+            waiter.expires_at = waiter.sent_at + self.linger
 
     def _line(self, key: Hashable) -> list[Waiter[F]]:
         """The line of a key, after the tombstones that have expired were taken out of it."""
         line = self._lines.get(key, [])
-        expired = self.clock() - self.linger
-        if any(not waiter.deliver and waiter.sent_at <= expired for waiter in line):
-            line[:] = [waiter for waiter in line if waiter.deliver or waiter.sent_at > expired]
+        now = self.clock()
+        for waiter in [waiter for waiter in line if waiter.expires_at <= now]:
+            self._remove(waiter)
 
         return line
+
+    def _remove(self, waiter: Waiter[F]) -> None:
+        line = self._lines.get(waiter.key, [])
+        if waiter in line:
+            line.remove(waiter)
+            if not line:
+                del self._lines[waiter.key]
 
 
 class Waiter(Generic[F]):
@@ -121,9 +145,25 @@ class Waiter(Generic[F]):
     Attributes:
         owed: Requests sent less replies received.
         misfit: Why the last frame of this key could not be the reply, if one came.
+        hurry: Called when a reply was swallowed that may have been this waiter's.
+        quiet: Once it has left, seconds for which no request of this key is to be sent.
     """
 
-    __slots__ = ("accept", "deliver", "key", "misfit", "owed", "pending", "sent_at", "tombstone")
+    __slots__ = (
+        "accept",
+        "answered",
+        "deliver",
+        "expires_at",
+        "first_sent_at",
+        "hurry",
+        "key",
+        "misfit",
+        "owed",
+        "pending",
+        "quiet",
+        "sent_at",
+        "tombstone",
+    )
 
     def __init__(self, pending: Pending[F], key: Hashable, accept: Callable[[F], Any], *, tombstone: bool) -> None:
         self.pending = pending
@@ -131,23 +171,39 @@ class Waiter(Generic[F]):
         self.accept = accept
         self.tombstone = tombstone
         self.deliver: Callable[[Any], None] | None = None
+        self.hurry: Callable[[], None] | None = None
         self.misfit: ProtocolError | None = None
+        self.answered = False
         self.owed = 0
-        self.sent_at = -math.inf
+        self.quiet = 0.0
+        self.first_sent_at = self.sent_at = -math.inf
+        self.expires_at = math.inf
+
+    @property
+    def repeats(self) -> bool:
+        """Whether its request was sent already."""
+        return self.sent_at > -math.inf
 
     def listen(self, deliver: Callable[[Any], None]) -> None:
         """Says who is to hear of the reply; called once for each request that is sent, before `sent`."""
         self.deliver = deliver
+        self.hurry = None
+        self.answered = False
 
     def sent(self) -> None:
         """Notes that the request goes out now, for the first time or again."""
+        now = self.pending.clock()
+        if not self.repeats:
+            self.first_sent_at = now
+
+        self.sent_at = now
         self.owed += 1
-        self.sent_at = self.pending.clock()
 
     def answer(self, value: Any) -> None:
         """Delivers a reply, or an error, to who listens."""
         deliver, self.deliver = self.deliver, None
         if deliver:
+            self.answered = True
             deliver(value)
 
     def __enter__(self) -> Self:
@@ -156,3 +212,13 @@ class Waiter(Generic[F]):
 
     def __exit__(self, *_: object) -> None:
         self.pending.leave(self)
+
+
+def hurry_first(line: Iterable[Waiter[Any]]) -> None:
+    """Tells the first who still waits that a reply was swallowed."""
+    for waiter in line:
+        if waiter.deliver:
+            if waiter.hurry:
+                waiter.hurry()
+
+            return

@@ -31,7 +31,7 @@ class Turns:
 
     async def take(self, key: Hashable, rank: int) -> None:
         """Returns when it is this request's turn; a key of None excludes nobody."""
-        if not self._waiting and self._may(key):
+        if self._may(key):  # nobody who waits could go instead: `give` has let go on who can
             self._grant(key)
             return
 
@@ -48,12 +48,24 @@ class Turns:
 
             raise
 
-    def give(self, key: Hashable) -> None:
-        """Gives the turn back, and lets those go on who can."""
+    def give(self, key: Hashable, *, quiet: float = 0.0) -> None:
+        """Gives the turn back, and lets those go on who can; the key stays busy for so many seconds."""
         self._free += 1
+        if quiet:
+            asyncio.get_running_loop().call_later(quiet, self._end_quiet, key)
+        else:
+            self._busy.discard(key)
+
+        self._next()
+
+    def _end_quiet(self, key: Hashable) -> None:
         self._busy.discard(key)
+        self._next()
+
+    def _next(self) -> None:
+        """Lets those go on who can; who was cancelled takes itself out."""
         for turn in list(self._waiting):
-            if self._may(turn.key):
+            if self._may(turn.key) and not turn.granted.done():
                 self._waiting.remove(turn)
                 self._grant(turn.key)
                 turn.granted.set_result(None)

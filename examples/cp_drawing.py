@@ -23,7 +23,7 @@ POINTS = 1000
 
 async def main() -> None:
     """Streams the points through the arm's queue, which holds far fewer than there are."""
-    async with Magician.connect(URL, window=8) as arm:
+    async with Magician.connect(URL) as arm:
         await arm.set_end_effector(Pen())
         await arm.request(c.SET_CP_PARAMS, c.CPParams(plan_acc=100, junction_vel=50, acc=100))
         await arm.move_to(X, Y, Z)

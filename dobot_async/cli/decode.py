@@ -1,6 +1,8 @@
 """`decode`: which frames are in some bytes, what they say, and what is wrong with the rest.
 
-AA AA 02 0A 00 F6 | AA AA 02 0A 00 F5 | AA AA 13 54      GetPose; a wrong checksum; the beginning of a frame
+    AA AA 02 0A 00 F6 | AA AA 02 0A 00 F5 | AA AA 13 54      GetPose; a wrong checksum; the beginning of a frame
+
+Frames are found as the driver finds them, by its own parser; only the names of the rest are made here.
 """
 
 from __future__ import annotations
@@ -30,9 +32,8 @@ SEPARATORS = re.compile(r"0x|[\s,:;-]+", re.IGNORECASE)
 def decode(session: Session, digits: tuple[str, ...]) -> None:
     """Decode the bytes of frames.
 
-    They may be of either direction, such as AA AA 02 0A 00 F6. Spaces, commas, colons and 0x may stand between
-    the bytes. A frame that can be a request and a reply is shown as
-    both. What is no frame is shown as junk, with the reason.
+    They may be of either direction, such as AA AA 02 0A 00 F6. Spaces, commas, colons and 0x may stand between the
+    bytes. A frame that can be a request and a reply is shown as both. What is no frame is junk, shown with the reason.
     """
     try:
         data = bytes.fromhex(SEPARATORS.sub("", " ".join(digits)))
@@ -91,6 +92,10 @@ def reason(junk: bytes) -> str:
 def described(frame: Frame) -> dict[str, Any]:
     """What is to be said of a frame; "request" and "reply" are there if it can be one."""
     command, values = readings(frame, (REQUEST, REPLY))
+    if not frame.params and values.get(REPLY) is not None:
+        # Some text layouts accept no bytes at all, but an arm ends each text with NUL.
+        del values[REPLY]
+
     return {
         "raw": raw(frame),
         "id": frame.id,

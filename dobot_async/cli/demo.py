@@ -1,6 +1,8 @@
 """`demo`: homes an arm and lets it carry pieces to and fro; without --url a simulated one behind a pseudo-terminal.
 
-PIECES at the right  --->  at the left  --->  at the right  ...      one direction each cycle
+    PIECES at the right  --->  at the left  --->  at the right  ...      one direction each cycle
+
+Each piece is a batch, queued while the arm still carries the one before it. Link and arm count what the summary tells.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ SIDE, UP, DOWN = 100.0, 60.0, 0.0
 """How far to either side they lie, and how high they are carried and picked up: y and z, mm."""
 
 GRIP = 0.2  # seconds that the cup takes to hold
-SPEED = 4.0
+SPEED = 5.0
 REDRAW = 0.1
 LINE = PTPMode.MOVL_XYZ
 
@@ -46,6 +48,7 @@ class Summary:
         pieces: How many were carried.
         commands: How many the arm executed; a simulated arm's own count.
         seconds: How long it took.
+        speed: How much faster than a real arm it is simulated; 1 for a real one.
         round_trips: Requests that were answered.
         repeated: Requests that had to be sent again.
         junk_bytes: Bytes that belong to no frame.
@@ -57,6 +60,7 @@ class Summary:
     pieces: int
     commands: int
     seconds: float
+    speed: float
     round_trips: int
     repeated: int
     junk_bytes: int
@@ -69,7 +73,8 @@ class Summary:
             (
                 f"pieces       {self.pieces} carried at {self.url}",
                 f"commands     {self.commands} executed",
-                f"duration     {self.seconds:.1f} s",
+                f"duration     {self.seconds:.1f} s"
+                + (f", {self.speed:g} times real speed" if self.speed != 1 else ""),
                 f"round trips  {self.round_trips} ({rate:.0f} per second), {self.repeated} repeated",
                 f"junk bytes   {self.junk_bytes}, {self.bad_frames} bad frames",
             )
@@ -117,10 +122,8 @@ class Work:
 
     async def _tell(self, phase: str) -> None:
         self.phase = phase
-        rows = dict(self.rows(await self._arm.get_pose()))
-        self._say(
-            "  |  ".join([rows.pop("work"), *(f"{name} {text}" for name, text in rows.items() if name != "joints")])
-        )
+        rows = self.rows(await self._arm.get_pose())
+        self._say("  |  ".join([phase, *(f"{name} {rows[name]}" for name in ("tool", "queue", "done"))]))
 
     async def _queue(self, source: tuple[float, float], target: tuple[float, float]) -> Motion:
         """Queues what carries one piece; returns its last motion."""
@@ -158,8 +161,8 @@ def ways(cycles: int) -> Iterator[tuple[tuple[float, float], tuple[float, float]
 def demo(ctx: click.Context, cycles: int, speed: float | None, yes: bool) -> None:
     """Let a simulated arm pick and place.
 
-    It is reached through a real (pseudo) serial port. With --url that arm does it, after a question, for it
-    really moves; DOBOT_URL is not used here.
+    It is reached through a (pseudo) serial port. With --url that arm does it, after a question, for it really moves;
+    DOBOT_URL is not used here.
     """
     session: Session = ctx.obj
     assert ctx.parent
@@ -193,7 +196,7 @@ async def perform(
     session: Session, url: str | None, cycles: int, speed: float, draw: Callable[[Mapping[str, str]], None] | None
 ) -> Summary:
     """Runs the demo on the arm at a URL, or on a simulated one."""
-    from dobot_async.simulator import simulate  # noqa: PLC0415 - the other commands start without it
+    from dobot_async.simulator import simulate
 
     async with AsyncExitStack() as stack:
         simulation = None
@@ -207,17 +210,22 @@ async def perform(
         async with alongside(watch(arm, work, draw)) if draw else nullcontext():
             await work.perform()
 
+        pose = await arm.get_pose()
+        if draw:
+            draw(work.rows(pose))
+
         stats = arm.link.stats
         return Summary(
             url=url,
             pieces=work.pieces,
             commands=len(simulation.arm.executed) if simulation else sum(motion.done for motion in work.motions),
             seconds=time.monotonic() - started,
+            speed=speed if simulation else 1.0,
             round_trips=stats.received - stats.unexpected,
             repeated=stats.repeated,
             junk_bytes=stats.junk_bytes,
             bad_frames=stats.bad_frames,
-            pose=await arm.get_pose(),
+            pose=pose,
         )
 
 

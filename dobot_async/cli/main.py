@@ -1,9 +1,11 @@
 """The command group: the options that come before a command, and what becomes of errors.
 
-exit code   0  done
-            1  the arm or the link failed: one line on standard error
-            2  wrong usage
-            128 + n  signal n ended it (130 Ctrl-C, 143 SIGTERM); 141 if nobody reads the output any more
+Exit codes:
+
+    0        done
+    1        the arm or the link failed; one line on standard error says how
+    2        wrong usage
+    128 + n  signal n ended it: 130 Ctrl-C, 143 SIGTERM; 141 if nobody reads the output any more
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ class Output:
             yield
             return
 
-        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
         with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), transient=True) as bar:
             bar.add_task(what, total=None)
@@ -75,7 +75,7 @@ class Output:
             yield lambda _: None
             return
 
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
         with Progress(*columns, transient=True) as bar:
@@ -85,8 +85,8 @@ class Output:
     @contextmanager
     def panel(self) -> Iterator[Callable[[Mapping[str, str]], None]]:
         """Draws named lines in place on a terminal, for the length of a block; yields what to draw them with."""
-        from rich.live import Live  # noqa: PLC0415
-        from rich.table import Table  # noqa: PLC0415
+        from rich.live import Live
+        from rich.table import Table
 
         def draw(rows: Mapping[str, str]) -> None:
             table = Table(show_header=False)
@@ -134,9 +134,9 @@ def words(value: Any) -> str:
 
 def tool_words(pose: Pose) -> str:
     """Returns where the tool is, mm and degrees."""
-    return "  ".join(f"{axis} {getattr(pose, axis):.2f}" for axis in "xyzr")
+    return "  ".join(f"{axis} {getattr(pose, axis):7.2f}" for axis in "xyzr")
 
 
 def joint_words(pose: Pose) -> str:
     """Returns the joints, degrees."""
-    return "  ".join(f"{joint} {getattr(pose, joint):.2f}" for joint in ("j1", "j2", "j3", "j4"))
+    return "  ".join(f"{joint} {getattr(pose, joint):7.2f}" for joint in ("j1", "j2", "j3", "j4"))

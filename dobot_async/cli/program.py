@@ -24,6 +24,7 @@ from dobot_async.cli.commands import MODES, ON_OFF
 from dobot_async.cli.session import Session
 from dobot_async.errors import DobotError
 from dobot_async.magician.arm import Magician
+from dobot_async.magician.params import IOFunction, PTPMode
 from dobot_async.magician.verbs import Verbs
 from dobot_async.motion import Motion
 from dobot_async.wire import Command
@@ -78,7 +79,7 @@ def whole(text: str) -> int:
     return int(text)
 
 
-def mode(text: str) -> Any:
+def mode(text: str) -> PTPMode:
     """A way to move: movj, movl, jump, ..."""
     return MODES[text.lower()]
 
@@ -88,12 +89,18 @@ def state(text: str) -> bool:
     return ON_OFF[text.lower()]
 
 
+def function(text: str) -> IOFunction:
+    """What a pin is for: do, pwm, di, adc, ..."""
+    return FUNCTIONS[text.lower()]
+
+
 def takes(reader: Reader, *names: str) -> tuple[tuple[str, Reader], ...]:
     """Arguments of one kind."""
     return tuple((name, reader) for name in names)
 
 
 STEPS = Steps()
+FUNCTIONS = {each.name.lower(): each for each in IOFunction}
 XYZR = takes(number, "x", "y", "z", "r")
 JOINTS = takes(number, "j1", "j2", "j3", "j4")
 PIN = takes(whole, "address")
@@ -110,6 +117,7 @@ VERBS: Mapping[str, Verb] = {
     "suction": Verb(lambda on: STEPS.suction(on, pump=on), takes(state, "on"), 1),
     "gripper": Verb(STEPS.gripper, takes(state, "closed"), 1, {"pump": state}),
     "laser": Verb(STEPS.laser, takes(state, "on"), 1),
+    "pin": Verb(STEPS.configure_io, (*PIN, ("function", function)), 2),
     "output": Verb(STEPS.set_output, (*PIN, ("level", state)), 2),
     "pwm": Verb(STEPS.set_pwm, (*PIN, *takes(number, "frequency", "duty_cycle")), 3),
     "conveyor": Verb(STEPS.conveyor, takes(whole, "speed"), 1, {"distance": whole, "motor": whole}),
@@ -177,6 +185,7 @@ KINDS: Mapping[Reader, str] = {
     whole: "a whole number",
     mode: f"one of {', '.join(MODES)}",
     state: "on or off",
+    function: f"one of {', '.join(FUNCTIONS)}",
 }
 
 
@@ -205,6 +214,9 @@ def run_program(session: Session, file: TextIO) -> None:
         raise click.UsageError(f"{file.name} is not UTF-8 text: {error}") from None
     except ValueError as error:
         raise click.UsageError(f"{file.name} is wrong, and nothing was sent:\n{error}") from None
+
+    if not steps:
+        raise click.UsageError(f"{file.name} has no commands")
 
     with session.output.counting(file.name, len(steps)) as report:
         session.ask(lambda arm: execute(arm, steps, report))

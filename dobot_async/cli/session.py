@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import signal
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
-from contextlib import asynccontextmanager, nullcontext, suppress
+from contextlib import asynccontextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
@@ -117,21 +117,23 @@ def run(work: Coroutine[Any, Any, T]) -> T:
         click.UsageError: The library refused an argument, or the URL.
     """
     received: list[int] = []
+    before = {number: signal.getsignal(number) for number in SIGNALS}
 
     async def cancellable() -> T:
         loop = asyncio.get_running_loop()
         task = asyncio.current_task()
         assert task
 
-        def cancel(number: int) -> None:
+        def cancel(number: int, _: object) -> None:
             received.append(number)
-            task.cancel()
+            if not loop.is_closed():
+                loop.call_soon_threadsafe(task.cancel)
 
-        for number in SIGNALS:
+        # Not the loop's own handlers: those end with the loop, and the next signal would hit whatever comes after it.
+        for number, handler in before.items():
             # Whoever started this with a signal ignored (nohup, a shell's background) wants it ignored.
-            if signal.getsignal(number) is not signal.SIG_IGN:
-                with suppress(NotImplementedError):
-                    loop.add_signal_handler(number, cancel, number)
+            if handler is not signal.SIG_IGN:
+                signal.signal(number, cancel)
 
         return await work
 
@@ -145,3 +147,6 @@ def run(work: Coroutine[Any, Any, T]) -> T:
             raise click.UsageError(str(error)) from error
 
         raise
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_IGN if received else handler)

@@ -55,8 +55,8 @@ def simulate(session: Session, /, arm: str | None, listen: str, speed: float, se
 
 async def serve(session: Session, arm: str, *, listen: str, line: dict[str, Any], **details: Any) -> None:
     """Runs the simulator until it is cancelled."""
-    from dobot_async.simulator import Faults  # noqa: PLC0415 - the other commands start without it
-    from dobot_async.simulator import simulate as simulated  # noqa: PLC0415
+    from dobot_async.simulator import Faults
+    from dobot_async.simulator import simulate as simulated
 
     if listen == "memory":
         raise click.UsageError("memory is of no use to other programs; use pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0")

@@ -1,6 +1,8 @@
 """Frames in words: which command, as a request or as an answer, with which values; and the file of `--trace`.
 
-{"time": 1700000000.0, "direction": "out", "command": "GetPose", "value": null, "raw": "aa aa 02 0a 00 f6"}
+    {"time": 1700000000.0, "direction": "out", "command": "GetPose", "value": null, "raw": "aa aa 02 0a 00 f6"}
+
+All names, layouts and sections are those of the command table.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ import json
 import sys
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -52,13 +54,17 @@ def raw(frame: Frame) -> bytes:
 @contextmanager
 def tracing(path: str) -> Iterator[Trace]:
     """Opens the file of a trace; "-" is standard error."""
-    with ExitStack() as stack:
-        try:
-            file = sys.stderr if path == "-" else stack.enter_context(Path(path).open("w", encoding="utf-8"))
-        except OSError as error:
-            raise click.BadParameter(str(error), param_hint="--trace") from error
+    if path == "-":
+        yield Trace(sys.stderr)
+        return
 
+    file = opened(path)
+    try:
         yield Trace(file)
+    finally:
+        # What could not be written was told when it happened.
+        with suppress(OSError):
+            file.close()
 
 
 class Trace:
@@ -80,6 +86,14 @@ class Trace:
             self._file = None
             with suppress(OSError):
                 click.echo(f"warning: the trace ends here: {error}", err=True)
+
+
+def opened(path: str) -> TextIO:
+    """Returns a new file; that it cannot be written is wrong usage."""
+    try:
+        return Path(path).open("w", encoding="utf-8")
+    except OSError as error:
+        raise click.BadParameter(str(error), param_hint="--trace") from error
 
 
 def described(frame: Frame, *, outgoing: bool) -> dict[str, Any]:

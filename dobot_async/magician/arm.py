@@ -6,7 +6,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator, Awaitable
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Literal, Self, TypeVar
 
@@ -176,73 +176,75 @@ class Magician(Verbs[Awaitable[None]]):
 
         return await self.link.request(command, value, timeout=timeout)
 
-    async def get_pose(self) -> c.Pose:
+    async def get_pose(self, *, timeout: float | None = None) -> c.Pose:
         """Returns where the tool is (mm, degrees) and the joints (degrees). Manual 2.4.1."""
-        return await self.link.request(c.GET_POSE, None)
+        return await self.link.request(c.GET_POSE, None, timeout=timeout)
 
-    async def get_rail(self) -> float:
+    async def get_rail(self, *, timeout: float | None = None) -> float:
         """Returns where the arm stands on its rail, in mm."""
-        return await self.link.request(c.GET_POSE_L, None)
+        return await self.link.request(c.GET_POSE_L, None, timeout=timeout)
 
-    async def get_info(self) -> DeviceInfo:
+    async def get_info(self, *, timeout: float | None = None) -> DeviceInfo:
         """Returns serial number, name and firmware version. Manual 2.3."""
-        version = await self.link.request(c.GET_DEVICE_VERSION, None)
+        version = await self.link.request(c.GET_DEVICE_VERSION, None, timeout=timeout)
         return DeviceInfo(
-            serial_number=await self.link.request(c.GET_DEVICE_SN, None),
-            name=await self.link.request(c.GET_DEVICE_NAME, None),
+            serial_number=await self.link.request(c.GET_DEVICE_SN, None, timeout=timeout),
+            name=await self.link.request(c.GET_DEVICE_NAME, None, timeout=timeout),
             version=f"{version.major_version}.{version.minor_version}.{version.revision}",
         )
 
-    async def get_alarms(self) -> tuple[Alarm, ...]:
+    async def get_alarms(self, *, timeout: float | None = None) -> tuple[Alarm, ...]:
         """Returns all alarms that are set, with cause and remedy. Manual 2.5.1."""
-        return decode(await self.link.request(c.GET_ALARMS_STATE, None))
+        return decode(await self.link.request(c.GET_ALARMS_STATE, None, timeout=timeout))
 
-    async def clear_alarms(self) -> None:
+    async def clear_alarms(self, *, timeout: float | None = None) -> None:
         """Clears the alarms; what the arm was doing when they came up does not go on. Manual 2.5.2."""
-        await self.link.request(c.CLEAR_ALL_ALARMS_STATE, None)
+        await self.link.request(c.CLEAR_ALL_ALARMS_STATE, None, timeout=timeout)
 
     async def recover(self) -> None:
         """Clears the alarms, empties the queue and starts it: the arm is ready for new commands."""
         await self.clear_alarms()
         await self.queue.clear()
 
-    async def get_input(self, address: int) -> bool:
+    async def get_input(self, address: int, *, timeout: float | None = None) -> bool:
         """Returns the level of a digital input (1 to 20). Manual 2.16.4."""
-        return bool((await self.link.request(c.GET_IODI, address)).level)
+        return bool((await self.link.request(c.GET_IODI, address, timeout=timeout)).level)
 
-    async def get_output(self, address: int) -> bool:
+    async def get_output(self, address: int, *, timeout: float | None = None) -> bool:
         """Returns the level that a digital output (1 to 20) was set to. Manual 2.16.2."""
-        return bool((await self.link.request(c.GET_IODO, address)).level)
+        return bool((await self.link.request(c.GET_IODO, address, timeout=timeout)).level)
 
-    async def get_adc(self, address: int) -> int:
+    async def get_adc(self, address: int, *, timeout: float | None = None) -> int:
         """Returns an analog input (1 to 20), 0 to 4095. Manual 2.16.5."""
-        return (await self.link.request(c.GET_IOADC, address)).value
+        return (await self.link.request(c.GET_IOADC, address, timeout=timeout)).value
 
-    async def set_color_sensor(self, port: c.ColorPort, *, on: bool = True) -> None:
+    async def set_color_sensor(self, port: c.ColorPort, *, on: bool = True, timeout: float | None = None) -> None:
         """Switches the colour sensor at a port."""
-        await self.link.request(c.SET_COLOR_SENSOR, c.ColorSensor(on, port))
+        await self.link.request(c.SET_COLOR_SENSOR, c.ColorSensor(on, port), timeout=timeout)
 
-    async def get_color(self) -> c.Color:
+    async def get_color(self, *, timeout: float | None = None) -> c.Color:
         """Returns the colour that the sensor sees."""
-        return await self.link.request(c.GET_COLOR_SENSOR, None)
+        return await self.link.request(c.GET_COLOR_SENSOR, None, timeout=timeout)
 
-    async def set_infrared_sensor(self, port: c.InfraredPort, *, on: bool = True) -> None:
+    async def set_infrared_sensor(self, port: c.InfraredPort, *, on: bool = True, timeout: float | None = None) -> None:
         """Switches the infrared sensor at a port."""
-        await self.link.request(c.SET_INFRARED_SENSOR, c.InfraredSensor(on, port))
+        await self.link.request(c.SET_INFRARED_SENSOR, c.InfraredSensor(on, port), timeout=timeout)
 
-    async def get_infrared(self, port: c.InfraredPort) -> bool:
+    async def get_infrared(self, port: c.InfraredPort, *, timeout: float | None = None) -> bool:
         """Returns whether the infrared sensor at a port sees something."""
-        state = await self.link.request(c.GET_INFRARED_SENSOR, port)
+        state = await self.link.request(c.GET_INFRARED_SENSOR, port, timeout=timeout)
         return state != 0
 
-    async def set_rail(self, *, on: bool = True, version: c.AccessoryVersion = c.AccessoryVersion.V1) -> None:
+    async def set_rail(
+        self, *, on: bool = True, version: c.AccessoryVersion = c.AccessoryVersion.V1, timeout: float | None = None
+    ) -> None:
         """Says whether the arm stands on a rail; needed before `move_to(l=...)`."""
-        await self.link.request(c.SET_DEVICE_WITH_L, c.DeviceWithL(on, version))
+        await self.link.request(c.SET_DEVICE_WITH_L, c.DeviceWithL(on, version), timeout=timeout)
 
-    async def set_end_effector(self, tool: c.EndEffectorParams) -> None:
+    async def set_end_effector(self, tool: c.EndEffectorParams, *, timeout: float | None = None) -> None:
         """Says which tool is on the arm: SuctionCup(), Gripper(), Pen(), Laser() or its own mm. Manual 2.9.1."""
-        await self.link.request(c.SET_END_EFFECTOR_PARAMS, tool)
-        self.kinematics = Kinematics(tool.x_bias, tool.y_bias, tool.z_bias)
+        await self.link.request(c.SET_END_EFFECTOR_PARAMS, tool, timeout=timeout)
+        self.kinematics = replace(self.kinematics, x_bias=tool.x_bias, y_bias=tool.y_bias, z_bias=tool.z_bias)
 
     async def pause(self) -> None:
         """Lets the arm finish the command that it executes, and then wait. Manual 2.19.2."""

@@ -2,5 +2,7 @@
 
 from dobot_async.simulator.endpoints import Simulation, simulate
 from dobot_async.simulator.faults import Faults
+from dobot_async.simulator.magician import Quirks, SimulatedMagician
+from dobot_async.simulator.work import DeviceOptions
 
-__all__ = ["Faults", "Simulation", "simulate"]
+__all__ = ["DeviceOptions", "Faults", "Quirks", "SimulatedMagician", "Simulation", "simulate"]

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import math
 import os
 import tty
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from functools import partial
 from random import Random
 from typing import Any, cast
 from urllib.parse import SplitResult, urlsplit
@@ -52,11 +54,15 @@ class Simulation:
         self.faults = faults
         self._random = Random(seed)  # noqa: S311 - repeatable faults, no secrets
         self._clients: set[Client] = set()
+        self._ended = False
 
     def client(self, deliver: Callable[[bytes], None], hang_up: Callable[[], None], *, ordered: bool) -> Client:
         """Called by an endpoint: somebody has connected, and takes replies by `deliver`."""
         client = Client(self.arm.session, self.faults, self._random, deliver, hang_up, ordered=ordered)
         self._clients.add(client)
+        if self._ended:
+            self.unplug()  # a connection that was being made when the simulation ended
+
         return client
 
     def leave(self, client: Client) -> None:
@@ -69,6 +75,11 @@ class Simulation:
         for client in list(self._clients):
             self.leave(client)
             client.hang_up()
+
+    def end(self) -> None:
+        """Breaks all lines, for good."""
+        self._ended = True
+        self.unplug()
 
 
 class Client:
@@ -140,30 +151,36 @@ async def simulate(
     if model not in MODELS:
         raise ValueError(f"no simulator for {model!r}; there are: {', '.join(MODELS)}")
 
-    if not speed > 0:
-        raise ValueError(f"speed must be above 0, not {speed!r}")
+    if not 0 < speed < math.inf:
+        raise ValueError(f"speed must be above 0 and finite, not {speed!r}")
 
+    serve = endpoint(listen)
     loop = asyncio.get_running_loop()
     started = loop.time()
     arm = MODELS[model](clock or (lambda: (loop.time() - started) * speed), **details)
     simulation = Simulation(arm, faults or Faults(), seed)
     async with AsyncExitStack() as stack:
-        simulation.url = await endpoint(listen)(simulation, urlsplit(listen), stack)
-        stack.callback(simulation.unplug)
+        simulation.url = await serve(simulation, stack)
+        stack.callback(simulation.end)
         yield simulation
 
 
-def endpoint(listen: str) -> Callable[[Simulation, SplitResult, AsyncExitStack], Any]:
+def endpoint(listen: str) -> Callable[[Simulation, AsyncExitStack], Awaitable[str]]:
     """What serves a place to listen at."""
-    kinds = {"memory": in_memory, "pty": on_pty, "tcp": on_tcp, "udp": on_udp}
-    kind = listen.split(":", 1)[0]
-    if kind not in kinds or (kind in {"memory", "pty"}) != (listen == kind):
-        raise ValueError(f"cannot listen at {listen!r}; use memory, pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0")
+    local = {"memory": in_memory, "pty": on_pty}
+    if listen in local:
+        return local[listen]
 
-    return kinds[kind]
+    with suppress(ValueError):
+        place = urlsplit(listen)
+        serve = {"tcp": on_tcp, "udp": on_udp}.get(place.scheme)
+        if serve and place.hostname and place.geturl() == f"{place.scheme}://{place.netloc}":
+            return partial(serve, host=place.hostname, port=place.port or 0)
+
+    raise ValueError(f"cannot listen at {listen!r}; use memory, pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0")
 
 
-async def in_memory(simulation: Simulation, _: SplitResult, stack: AsyncExitStack) -> str:
+async def in_memory(simulation: Simulation, stack: AsyncExitStack) -> str:
     """Clients in the same process; they open `sim://` and the simulation's name."""
     name = f"arm{next(names)}"
     running[name] = simulation
@@ -171,32 +188,34 @@ async def in_memory(simulation: Simulation, _: SplitResult, stack: AsyncExitStac
     return f"sim://{name}"
 
 
-async def on_pty(simulation: Simulation, _: SplitResult, stack: AsyncExitStack) -> str:
+async def on_pty(simulation: Simulation, stack: AsyncExitStack) -> str:
     """A serial port whose other end is the arm."""
     port = PseudoTerminal(simulation)
     stack.callback(port.close)
     return f"serial://{port.path}"
 
 
-async def on_tcp(simulation: Simulation, url: SplitResult, stack: AsyncExitStack) -> str:
+async def on_tcp(simulation: Simulation, stack: AsyncExitStack, *, host: str, port: int) -> str:
     """A TCP port, as a serial server has it."""
     loop = asyncio.get_running_loop()
-    server = await loop.create_server(lambda: Connection(simulation), url.hostname, url.port or 0)
+    server = await loop.create_server(lambda: Connection(simulation), host, port)
     stack.push_async_callback(server.wait_closed)
     stack.callback(server.close)
-    host, port = server.sockets[0].getsockname()[:2]
-    return f"tcp://{f'[{host}]' if ':' in host else host}:{port}"
+    return address("tcp", server.sockets[0].getsockname())
 
 
-async def on_udp(simulation: Simulation, url: SplitResult, stack: AsyncExitStack) -> str:
+async def on_udp(simulation: Simulation, stack: AsyncExitStack, *, host: str, port: int) -> str:
     """A UDP port, as the arm's Wi-Fi has it."""
     loop = asyncio.get_running_loop()
-    transport, _ = await loop.create_datagram_endpoint(
-        lambda: Datagrams(simulation), local_addr=(url.hostname or "127.0.0.1", url.port or 0)
-    )
+    transport, _ = await loop.create_datagram_endpoint(lambda: Datagrams(simulation), local_addr=(host, port))
     stack.callback(transport.close)
-    host, port = transport.get_extra_info("sockname")[:2]
-    return f"udp://{f'[{host}]' if ':' in host else host}:{port}"
+    return address("udp", transport.get_extra_info("sockname"))
+
+
+def address(scheme: str, name: tuple[Any, ...]) -> str:
+    """The URL of a socket."""
+    host, port = name[:2]
+    return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
 
 
 class MemoryTransport:
@@ -209,11 +228,15 @@ class MemoryTransport:
         self._simulation = simulation
         self._stack = stack
         self._arriving, self._arrived = anyio.create_memory_object_stream[bytes](BUFFER)
-        self._client = simulation.client(self._arriving.send_nowait, self._arriving.close, ordered=False)
+        self._client = simulation.client(self._deliver, self._arriving.close, ordered=True)
 
     async def send(self, data: bytes) -> None:
         """Puts a request on the line."""
-        if self._arriving.statistics().open_send_streams == 0:
+        ends = self._arriving.statistics()
+        if not ends.open_receive_streams:
+            raise anyio.ClosedResourceError
+
+        if not ends.open_send_streams:
             raise anyio.BrokenResourceError
 
         self._client.send(data)
@@ -230,9 +253,17 @@ class MemoryTransport:
         if self._stack:
             await self._stack.aclose()
 
+    def _deliver(self, data: bytes) -> None:
+        """Hands over what fits; a client that never reads loses the rest."""
+        with suppress(anyio.WouldBlock):
+            self._arriving.send_nowait(data)
+
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:
     """Opens `sim:` with a simulation of its own, or `sim://name` of one that runs in this process."""
+    if url.path or url.fragment:
+        raise ValueError(f"{url.geturl()}: expected sim: with options only, such as sim:?speed=10")
+
     if url.netloc:
         simulation = running.get(url.netloc)
         if simulation is None or url.query:
@@ -299,11 +330,20 @@ class Connection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client has connected."""
         assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
         self._client = self._simulation.client(transport.write, transport.abort, ordered=True)
 
     def data_received(self, data: bytes) -> None:
         """It has sent something."""
         self._client.send(data)
+
+    def pause_writing(self) -> None:
+        """It does not read; what it asks meanwhile waits in the line."""
+        self._transport.pause_reading()
+
+    def resume_writing(self) -> None:
+        """It reads again."""
+        self._transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
         """It has gone."""
@@ -325,9 +365,13 @@ class Datagrams(asyncio.DatagramProtocol):
         """Somebody has sent something."""
         if addr not in self._clients:
             self._clients[addr] = self._simulation.client(
-                lambda reply: self._transport.sendto(reply, addr), lambda: None, ordered=False
+                lambda reply: self._transport.sendto(reply, addr), lambda: self._forget(addr), ordered=False
             )
             if len(self._clients) > MANY:
-                self._simulation.leave(self._clients.pop(next(iter(self._clients))))
+                self._forget(next(iter(self._clients)))
 
         self._clients[addr].send(data)
+
+    def _forget(self, addr: Any) -> None:
+        """The next datagram from there comes from a new client."""
+        self._simulation.leave(self._clients.pop(addr))

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import heapq
+import itertools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from random import Random
@@ -39,8 +42,9 @@ class Faults:
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"{name} is a probability, 0 to 1, not {getattr(self, name)!r}")
 
-        if self.latency < 0 or self.jitter < 0:
-            raise ValueError("latency and jitter are seconds, not negative")
+        for name in ("latency", "jitter"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} is finite seconds, not negative, not {getattr(self, name)!r}")
 
     @property
     def any(self) -> bool:
@@ -77,7 +81,9 @@ class Channel:
         self._ordered = ordered
         self._loop = asyncio.get_running_loop()
         self._due = 0.0
-        self._on_the_way: set[asyncio.TimerHandle] = set()
+        self._numbers = itertools.count()
+        self._on_the_way: list[tuple[float, int, bytes]] = []
+        self._timers: set[asyncio.TimerHandle] = set()
 
     def send(self, data: bytes) -> None:
         """Puts a message on the line."""
@@ -94,15 +100,20 @@ class Channel:
 
     def close(self) -> None:
         """Forgets what is on the way."""
-        for handle in self._on_the_way:
-            handle.cancel()
+        for timer in self._timers:
+            timer.cancel()
 
+        self._timers.clear()
         self._on_the_way.clear()
 
     def _later(self, due: float, piece: bytes) -> None:
         def arrive() -> None:
-            self._on_the_way.discard(handle)
-            self._deliver(piece)
+            self._timers.discard(timer)
+            _, _, first = heapq.heappop(self._on_the_way)
+            if not self._faults.stalled:
+                self._deliver(first)
 
-        handle = self._loop.call_at(due, arrive)
-        self._on_the_way.add(handle)
+        # The loop's timers for one moment fire in any order; each takes the message whose turn it is.
+        heapq.heappush(self._on_the_way, (due, next(self._numbers), piece))
+        timer = self._loop.call_at(due, arrive)
+        self._timers.add(timer)

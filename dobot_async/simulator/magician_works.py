@@ -20,6 +20,7 @@ from dobot_async.wire import Command
 __all__ = ["Works"]
 
 LEVELLING = 5.0  # seconds
+LIMITS = frozenset(range(0x40, 0x4A))
 LOSE_STEP = 0x50
 INVALID = 0x6C
 AT_LIMIT = 0.1  # degrees; nearer to a limit than this, its alarm stays
@@ -78,10 +79,9 @@ class Works:
 
     def _leave_limits(self, device: Device) -> None:
         """Clears the alarms of limits that the arm has left."""
-        alarms = device.alarms
-        left = {code for code, margin in margins(self._state.limits, device.joints).items() if margin > AT_LIMIT}
-        if alarms & left:
-            device.clear_alarms(left)
+        if device.alarms & LIMITS:
+            left = margins(self._state.limits, device.joints).items()
+            device.clear_alarms(code for code, margin in left if margin > AT_LIMIT)
 
     # The rows.
 

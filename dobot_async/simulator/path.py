@@ -27,6 +27,7 @@ __all__ = ["Leg", "Solver", "curve_leg", "joint_leg", "jump", "travel"]
 REPEATED_POINTS, BAD_JUMP = 0x13, 0x15
 UNDERWAY = 0x10
 EVERY = 5.0  # mm or degrees between two looks at the reach
+MOST_LOOKS = 1000  # a way that is longer than so many looks leaves the reach of any arm on the first of them
 HALVINGS = 40
 
 
@@ -173,7 +174,8 @@ def curve_leg(
         Fault: The solver's, if the end has to be reached and is out of reach.
     """
     length, turn = curve.length, curve.turn
-    solved = Solved(curve, solver, start, max(1, math.ceil(max(length, turn) / every)))
+    looks = min(max(length, turn) / every, MOST_LOOKS)
+    solved = Solved(curve, solver, start, max(1, math.ceil(looks)))
     if must_arrive:
         solver.inverse(curve.point(1.0))
 

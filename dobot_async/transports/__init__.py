@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import cast
+from typing import Any, cast
 from urllib.parse import urlsplit
 
 from dobot_async.transports.base import Transport
@@ -31,12 +31,16 @@ async def open_transport(url: str, *, arm: str) -> Transport:
     """
     try:
         parts = urlsplit(url)
+        return cast(Transport, await module_of(parts.scheme).open_url(parts, arm=arm))
     except ValueError as error:
-        raise ValueError(f"{url!r} is not a URL: {error}") from None
+        raise ValueError(f"{url!r}: {error}") from None
 
-    if parts.scheme not in SCHEMES:
+
+def module_of(scheme: str) -> Any:
+    """The module that opens a scheme's URLs."""
+    if scheme not in SCHEMES:
         forms = "; ".join(form for _, form in SCHEMES.values())
-        raise ValueError(f"{url!r} has no scheme that leads to an arm; use one of: {forms}")
+        raise ValueError(f"this has no scheme that leads to an arm; use one of: {forms}")
 
-    module, _ = SCHEMES[parts.scheme]
-    return cast(Transport, await import_module(module).open_url(parts, arm=arm))
+    module, _ = SCHEMES[scheme]
+    return import_module(module)

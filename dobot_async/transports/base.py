@@ -69,15 +69,18 @@ class Wrapped:
 
 
 def options(url: SplitResult, known: Mapping[str, Callable[[str], Any]]) -> dict[str, Any]:
-    """Returns the options behind the "?" of a URL, converted; raises ValueError that names what is wrong."""
+    """Returns the options behind the "?" of a URL, converted; raises ValueError that names the wrong one."""
     found = {}
     for name, text in parse_qsl(url.query, keep_blank_values=True, strict_parsing=bool(url.query)):
         if name not in known:
-            raise ValueError(f"{url.geturl()}: unknown option {name!r}; known: {', '.join(known) or 'none'}")
+            raise ValueError(f"unknown option {name!r}; known: {', '.join(known) or 'none'}")
+
+        if name in found:
+            raise ValueError(f"option {name} is given twice")
 
         try:
             found[name] = known[name](text)
         except ValueError:
-            raise ValueError(f"{url.geturl()}: {name}={text!r} is not a {known[name].__name__}") from None
+            raise ValueError(f"{name}={text!r} is no {known[name].__name__}") from None
 
     return found

@@ -22,13 +22,9 @@ WINDOW = 16
 async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001
     """Opens `udp://host[:8899]` or `tcp://host:port`."""
     options(url, {})
-    try:
-        host, port = url.hostname, url.port
-    except ValueError as error:
-        raise ValueError(f"{url.geturl()}: {error}") from None
-
-    if not host or url.path.strip("/") or (url.scheme == "tcp" and port is None):
-        raise ValueError(f"{url.geturl()}: expected {'udp://host' if url.scheme == 'udp' else 'tcp://host:port'}")
+    host, port = url.hostname, url.port
+    if not host or url.path.strip("/") or port == 0 or (url.scheme == "tcp" and port is None):
+        raise ValueError(f"expected {'udp://host' if url.scheme == 'udp' else 'tcp://host:port'}")
 
     try:
         if url.scheme == "udp":

@@ -11,6 +11,7 @@ import asyncio
 import os
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 from urllib.parse import SplitResult
 
@@ -26,6 +27,7 @@ __all__ = ["SerialTransport", "open_url"]
 BAUD = 115200
 WINDOW = 16
 DRAIN = 0.5
+POLL = 0.005
 BUFFER = 1 << 16
 
 
@@ -34,21 +36,22 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001
     path = url.netloc + url.path
     baud = options(url, {"baud": int}).get("baud", BAUD)
     if not path or baud <= 0:
-        raise ValueError(f"{url.geturl()}: expected serial:///dev/ttyUSB0 or serial://COM3, and a baud rate above 0")
+        raise ValueError("expected serial:///dev/ttyUSB0 or serial://COM3, and a baud rate above 0")
 
     port = serial.serial_for_url(path, baudrate=baud, do_not_open=True, exclusive=True if os.name == "posix" else None)
     port.dtr = port.rts = False
     try:
         await in_thread(port.open, port.close)
+        output, transport = await connection_for_serial(asyncio.get_running_loop(), SerialTransport, port)
     except (OSError, ValueError) as error:
+        port.close()
         raise ConnectFailed(
             f"cannot open {path}: {error}; is the arm plugged in, is this its port, may this user open it "
             "(group dialout), and is no other program using it?"
         ) from error
 
-    loop = asyncio.get_running_loop()
-    _, transport = await connection_for_serial(loop, SerialTransport, port)
-    await transport.made
+    # Said here already, for waiting until it is said could be cancelled, and would leave an open port to nobody.
+    transport.connection_made(output)
     return transport  # type: ignore[no-any-return]
 
 
@@ -60,7 +63,6 @@ class SerialTransport(asyncio.Protocol):
 
     def __init__(self) -> None:
         loop = asyncio.get_running_loop()
-        self.made: asyncio.Future[None] = loop.create_future()
         self._loop = loop
         self._lost: asyncio.Future[None] = loop.create_future()
         self._cause: BaseException | None = None
@@ -81,10 +83,6 @@ class SerialTransport(asyncio.Protocol):
 
     async def receive(self) -> bytes:
         """Returns what has arrived, at least one byte."""
-        if self._buffer:
-            # A peer that never stops sending must not keep the loop from everybody else.
-            await asyncio.sleep(0)
-
         while not self._buffer:
             self._check()
             self._arrived = self._loop.create_future()
@@ -101,19 +99,16 @@ class SerialTransport(asyncio.Protocol):
         """Closes the port; what cannot be written within half a second is thrown away."""
         if not self._closing:
             self._closing = True
-            if not self._lost.done():
+            try:
                 await self._drain()
-
-            # A transport that closes by itself must not be aborted, unless output keeps it from ending.
-            if not self._lost.done() and (not self._transport.is_closing() or self._transport.get_write_buffer_size()):
-                self._transport.abort()
+            finally:
+                self._abort()
 
         await asyncio.shield(self._lost)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Called by pyserial-asyncio, a little after it has returned the transport."""
+        """The port is open; pyserial-asyncio calls this once more, a little after it has returned the transport."""
         self._transport = transport
-        self.made.set_result(None)
 
     def data_received(self, data: bytes) -> None:
         """Keeps what arrives; stops reading while nobody takes it."""
@@ -151,6 +146,9 @@ class SerialTransport(asyncio.Protocol):
 
     async def _drain(self) -> None:
         """Waits for the output for a moment, then throws away what the port did not take."""
+        if self._lost.done():
+            return
+
         transport = self._transport
         transport.set_write_buffer_limits(high=0)
         try:
@@ -158,15 +156,30 @@ class SerialTransport(asyncio.Protocol):
                 while transport.get_write_buffer_size() and not self._lost.done():
                     self._writable.clear()
                     await self._writable.wait()
-        except TimeoutError:
-            transport.serial.reset_output_buffer()
+
+                while not self._lost.done() and transport.serial.out_waiting:  # noqa: ASYNC110 - nobody tells when
+                    await asyncio.sleep(POLL)
+        except (TimeoutError, asyncio.CancelledError) as error:
+            # Whatever becomes of this, the port is closed next.
+            with suppress(Exception):
+                transport.serial.reset_output_buffer()
+
+            if isinstance(error, asyncio.CancelledError):
+                raise
+        except OSError:
+            return
+
+    def _abort(self) -> None:
+        """Ends the transport, exactly once: one that ends by itself is left alone, unless output keeps it from it."""
+        if not self._lost.done() and (not self._transport.is_closing() or self._transport.get_write_buffer_size()):
+            self._transport.abort()
 
 
 async def in_thread(call: Callable[[], None], undo: Callable[[], None]) -> None:
     """Runs a blocking call in a thread that ends with it; undoes it if the caller is cancelled meanwhile."""
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
-    abandoned = threading.Event()
+    order: list[str] = []  # whoever comes second sees it here, and undoes the call if it was abandoned
 
     def finish(error: Exception | None) -> None:
         if done.done():
@@ -184,18 +197,22 @@ async def in_thread(call: Callable[[], None], undo: Callable[[], None]) -> None:
         except Exception as caught:  # noqa: BLE001 - it is raised where the call is awaited
             error = caught
 
-        if abandoned.is_set():
-            undo()
-        else:
+        order.append("done")
+        if order[0] == "done":
             loop.call_soon_threadsafe(finish, error)
+        else:
+            undo()
 
     thread = threading.Thread(target=run, name="dobot_async open", daemon=True)
     thread.start()
     try:
         await done
     except asyncio.CancelledError:
-        abandoned.set()
-        undo()
-        raise
+        order.append("abandoned")
+        if order[0] == "done":
+            undo()
 
-    thread.join()
+        raise
+    finally:
+        if order[0] == "done":
+            thread.join()

@@ -58,10 +58,10 @@ async def test_the_queue_returns_when_the_arm_has_accepted() -> None:
         second = await arm.queue.move_to(200, 60, 40)
         assert first.index is not None
         assert second.index == first.index + 1
-        assert not first.done
+        assert [first.done, second.done] == [False, False]
         await second
         await second
-        assert first.done
+        assert [first.done, second.done] == [True, True]
         assert targets(sim) == [(220, 0, 40), (200, 60, 40)]
 
 

@@ -1,0 +1,123 @@
+"""What is wrong with a URL is said before anything is opened."""
+
+from __future__ import annotations
+
+from urllib.parse import urlsplit
+
+import pytest
+
+from dobot_async.transports import SCHEMES, open_transport
+from dobot_async.transports.base import options
+
+
+def refusal(url: str) -> str:
+    """Why a URL is refused. No loop runs the call, so it fails if it waits for anything."""
+    opening = open_transport(url, arm="magician")
+    with pytest.raises(ValueError, match=r"\S") as refused:
+        opening.send(None)
+
+    assert refused.type is ValueError
+    return str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "",
+        "/dev/ttyUSB0",
+        "COM3",
+        "192.168.1.20",
+        "192.168.1.20:8899",
+        "//host:1",
+        "://host",
+        "localhost:8899",
+        "usb:///dev/ttyUSB0",
+        "http://192.168.1.20",
+        "serials:///dev/ttyUSB0",
+    ],
+)
+def test_a_url_without_a_scheme_of_ours_is_shown_all_schemes(url: str) -> None:
+    message = refusal(url)
+    assert message.startswith(f"{url!r}: this has no scheme")
+    for scheme in SCHEMES:
+        assert f"{scheme}:" in message
+
+
+@pytest.mark.parametrize(
+    ("url", "wrong"),
+    [
+        ("tcp://", "expected tcp://host:port"),
+        ("tcp://:8899", "expected tcp://host:port"),
+        ("tcp://192.168.1.20", "expected tcp://host:port"),
+        ("tcp://192.168.1.20:", "expected tcp://host:port"),
+        ("tcp://192.168.1.20:0", "expected tcp://host:port"),
+        ("tcp://192.168.1.20:8899/path", "expected tcp://host:port"),
+        ("tcp:192.168.1.20:8899", "expected tcp://host:port"),
+        ("tcp://192.168.1.20:65536", "[Pp]ort out of range"),
+        ("tcp://192.168.1.20:-1", "[Pp]ort"),
+        ("tcp://192.168.1.20:http", "[Pp]ort.*'http'"),
+        ("tcp://[::1", "Invalid IPv6 URL"),
+        ("udp://", "expected udp://host"),
+        ("udp:", "expected udp://host"),
+        ("udp://:8899", "expected udp://host"),
+        ("udp://192.168.1.20:0", "expected udp://host"),
+        ("udp://192.168.1.20:99999", "[Pp]ort out of range"),
+        ("udp://192.168.1.20/path", "expected udp://host"),
+        ("udp://[fe80::1", "Invalid IPv6 URL"),
+        ("udp://192.168.1.20?baud=1", "unknown option 'baud'; known: none"),
+        ("tcp://192.168.1.20:1?window=1", "unknown option 'window'"),
+        ("serial:", "expected serial:///dev/ttyUSB0"),
+        ("serial://", "expected serial:///dev/ttyUSB0"),
+        ("serial://?baud=9600", "expected serial:///dev/ttyUSB0"),
+        ("serial:///dev/ttyUSB0?baud=0", "baud rate above 0"),
+        ("serial:///dev/ttyUSB0?baud=-9600", "baud rate above 0"),
+        ("serial:///dev/ttyUSB0?baud=fast", "baud='fast' is no int"),
+        ("serial:///dev/ttyUSB0?baud=", "baud='' is no int"),
+        ("serial:///dev/ttyUSB0?baud=9600.0", "baud='9600.0' is no int"),
+        ("serial:///dev/ttyUSB0?speed=9600", "unknown option 'speed'; known: baud"),
+        ("serial:///dev/ttyUSB0?Baud=9600", "unknown option 'Baud'"),
+        ("serial:///dev/ttyUSB0?baud", "'baud'"),
+        ("serial:///dev/ttyUSB0?baud=9600&baud=115200", "option baud is given twice"),
+        ("serial:///dev/ttyUSB0?&", "'&'|''"),
+    ],
+)
+def test_a_bad_url_names_what_is_wrong(url: str, wrong: str) -> None:
+    message = refusal(url)
+    assert message.startswith(f"{url!r}: ")
+    with pytest.raises(ValueError, match=wrong):
+        raise ValueError(message)
+
+
+def test_options_are_converted() -> None:
+    found = options(urlsplit("serial:///dev/ttyUSB0?baud=9600"), {"baud": int})
+    assert found == {"baud": 9600}
+    assert options(urlsplit("serial:///dev/ttyUSB0"), {"baud": int}) == {}
+
+
+@pytest.mark.parametrize(
+    ("url", "path", "baud"),
+    [
+        ("serial://COM3", "COM3", 115200),
+        ("SERIAL://COM12?baud=9600", "COM12", 9600),
+        ("serial:COM3", "COM3", 115200),
+        ("serial:///dev/ttyUSB0", "/dev/ttyUSB0", 115200),
+        (
+            "serial:///dev/serial/by-id/usb-Silicon_Labs_CP2102:00-port0",
+            "/dev/serial/by-id/usb-Silicon_Labs_CP2102:00-port0",
+            115200,
+        ),
+        ("serial:///dev/tty.usbserial-A1B2", "/dev/tty.usbserial-A1B2", 115200),
+    ],
+)
+def test_the_path_of_a_port_is_taken_as_it_is(url: str, path: str, baud: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, int]] = []
+
+    def take(port: str, *, baudrate: int, **rest: object) -> None:
+        asked.append((port, baudrate))
+        raise StopAsyncIteration
+
+    monkeypatch.setattr("serial.serial_for_url", take)
+    with pytest.raises((StopAsyncIteration, RuntimeError)):
+        open_transport(url, arm="magician").send(None)
+
+    assert asked == [(path, baud)]
