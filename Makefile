@@ -2,12 +2,14 @@
 # make test      ruff, mypy and the whole test suite
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make format    what ruff can mend
+# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0]
+# make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all check pytest format clean
+.PHONY: demo test test-all check pytest format clean fuzz soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
@@ -36,6 +38,19 @@ test-all:
 
 pytest: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto
+
+SEEDS ?= 10000
+FIRST ?= 0
+
+soak: $(VENV)/.dev
+	$(BIN)/python tests/simulation/soak.py --seeds $(SEEDS) --first $(FIRST)
+
+# Guided by coverage if the extra `fuzz` (atheris) is installed.
+SECONDS ?= 60
+TARGET ?=
+
+fuzz: $(VENV)/.dev
+	$(BIN)/python tests/fuzz/fuzz.py --seconds $(SECONDS) $(TARGET)
 
 $(VENV)/.venv:
 	$(PYTHON) -m venv $(VENV)
