@@ -11,7 +11,7 @@ from collections import deque
 from typing import Generic, Self, TypeVar
 from weakref import WeakSet
 
-__all__ = ["Events", "Listener"]
+__all__ = ["Events", "Listener", "Watched"]
 
 T = TypeVar("T")
 BACKLOG = 256
@@ -80,3 +80,31 @@ class Listener(Generic[T]):
             await self._news.wait()
 
         return self._backlog.popleft()
+
+
+class Watched(Generic[T]):
+    """A value that changes; iterating yields each new value from now on.
+
+    Attributes:
+        value: What it is now.
+    """
+
+    def __init__(self, value: T) -> None:
+        self.value = value
+        self._changes: Events[T] = Events()
+
+    def change(self, value: T) -> None:
+        """Sets another value and tells everybody who listens."""
+        if value != self.value:
+            self.value = value
+            self._changes.publish(value)
+
+    def close(self) -> None:
+        """Ends every reader's loop once it has read the last change."""
+        self._changes.close()
+
+    def __aiter__(self) -> Listener[T]:
+        return self._changes.__aiter__()
+
+    def __repr__(self) -> str:
+        return f"<Watched: {self.value}>"

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
+from dobot_async.errors import MotionUnknown
 from dobot_async.wire import Command
 
 __all__ = ["Accepted", "Entry", "Executor"]
@@ -29,6 +30,13 @@ Accepted = Callable[[Entry, int | None], None]
 class Executor(Protocol):
     """What a family brings: how its arm takes commands, says how far it is, and stops."""
 
+    async def connected(self) -> None:
+        """Returns when the arm can be reached; raises ConnectionLost if that is over.
+
+        Raises:
+            MotionUnknown: It can be reached again, but it was switched off and on meanwhile.
+        """
+
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
         """Returns an entry for the queue.
 
@@ -40,6 +48,9 @@ class Executor(Protocol):
     async def left_space(self) -> int:
         """Returns how many commands the arm's queue can still take."""
 
+    distress: Callable[[MotionUnknown], None]
+    """Set by the queue: called when a motion turns out to be unknown while nobody asks."""
+
     @property
     def under_way(self) -> Collection[Entry]:
         """The commands that were sent and of which nobody knows yet whether the arm took them."""
@@ -47,10 +58,10 @@ class Executor(Protocol):
     async def push(self, entries: Sequence[Entry], accepted: Accepted) -> None:
         """Gives commands to the arm, each exactly once and in order, and calls `accepted` for each one.
 
-        Interrupted, it leaves commands `under_way`, which `settle` or the next `push` settles first.
+        It returns before all are accepted if the arm did not take them; they may be pushed again. Interrupted, it
+        leaves commands `under_way`, which `settle` or the next `push` settles first.
 
         Raises:
-            ReplyTimeout: The arm does not answer, and has not taken what was not accepted.
             MotionUnknown: Nothing can tell whether the arm took a command.
         """
 

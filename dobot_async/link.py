@@ -14,17 +14,19 @@ from __future__ import annotations
 
 import asyncio
 import enum
-from collections.abc import Callable, Hashable
+import random
+from collections.abc import Awaitable, Callable, Hashable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 import anyio
 
-from dobot_async.errors import ConnectionLost, ProtocolError, ReplyTimeout
-from dobot_async.events import Events
-from dobot_async.pending import Keyed, Pending, Waiter
+from dobot_async.errors import ConnectFailed, ConnectionLost, ProtocolError, ReplyTimeout
+from dobot_async.events import Events, Watched
+from dobot_async.pending import SWALLOWED, Keyed, Pending, Waiter
+from dobot_async.roundtrip import RoundTrip
 from dobot_async.transports import Transport
 from dobot_async.turns import Turns
 from dobot_async.wire import Command
@@ -33,10 +35,13 @@ __all__ = ["Link", "LinkState", "LinkStats", "Posted", "Unexpected"]
 
 R = TypeVar("R")
 Q = TypeVar("Q")
-ATTEMPTS = 3
 IMMEDIATE_RANK, QUEUED_RANK = 0, 1
 CLOSE_TIMEOUT = 2.0
-HURRY = 0.05  # seconds that an answer is waited for after the one before it was swallowed in its place, or so it seems
+FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0
+BROKEN = (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceError, OSError)
+MUTE = 3
+"""Unanswered requests in a row after which the arm may be waiting for the rest of a frame with a spoilt length: it gets
+so many bytes that mean nothing that any frame ends."""
 
 
 class Frame(Keyed, Protocol):
@@ -65,6 +70,9 @@ class Parser(Protocol[F]):
     def resync(self) -> list[F]:
         """Gives up an incomplete frame, returns the frames found inside of it."""
 
+    def reset(self) -> None:
+        """Forgets an incomplete frame: another stream begins."""
+
 
 class Encoder(Protocol[F_co]):
     """Makes a family's request frame of a command's row and its parameters."""
@@ -76,8 +84,12 @@ class LinkState(enum.Enum):
     """What a link is good for."""
 
     OPEN = "open"
+    REOPENING = "reopening"
     LOST = "lost"
     CLOSED = "closed"
+
+
+DEAD = {LinkState.LOST, LinkState.CLOSED}
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +126,11 @@ class Link(Generic[F]):
     """One connection to one arm; used once, from `start` to `aclose`.
 
     Attributes:
-        state: Whether it is open, was lost, or was closed.
-        events: Frames that nobody waited for, as `Unexpected`.
+        state: Its `value` says whether it is open, is being reopened, was lost or closed; `async for` yields changes.
+        outages: How often it was lost and reopened.
+        events: What happened unasked: frames that nobody waited for, as `Unexpected`, and what the family adds.
         trace: Called with (outgoing, frame) for each frame, if set.
+        stray: Called with each frame that nobody waited for, if set.
     """
 
     def __init__(
@@ -126,23 +140,43 @@ class Link(Generic[F]):
         encode: Encoder[F],
         *,
         url: str,
+        filler: bytes = b"",
         read_only: bool = False,
+        round_trip: RoundTrip | None = None,
+        reopen: Callable[[], Awaitable[Transport]] | None = None,
     ) -> None:
         self.url = url
-        self.state = LinkState.OPEN
-        self.events: Events[Unexpected[F]] = Events()
+        self.state = Watched(LinkState.OPEN)
+        self.outages = 0
+        self.events: Events[object] = Events()
         self.trace: Callable[[bool, F], None] | None = None
+        self.stray: Callable[[F], None] | None = None
+        self._reopen = reopen
         self._transport = transport
         self._parser = parser
         self._encode = encode
+        self._filler = filler
+        self._unanswered = 0
         self._read_only = read_only
         self._stats = LinkStats()
         self._loop = asyncio.get_running_loop()
         self._pending: Pending[F] = Pending(self._loop.time)
         self._turns = Turns(transport.in_flight)
+        self._round_trip = round_trip or RoundTrip()
+        self._heard: dict[Hashable, float] = {}
         self._sending = anyio.Lock(fast_acquire=True)
         self._cause: BaseException | None = None
         self._reader = self._loop.create_task(self._read(), name=f"dobot_async reader {url}")
+
+    @property
+    def disorder(self) -> float:
+        """Seconds within which messages of this link may overtake one another, and a doubled one arrive again."""
+        return self._transport.disorder
+
+    @property
+    def reply_timeout(self) -> float:
+        """Seconds after which a request counts as unanswered, as the round trips so far suggest."""
+        return self._round_trip.timeout
 
     @property
     def stats(self) -> LinkStats:
@@ -177,7 +211,6 @@ class Link(Generic[F]):
         """
         frame = self.frame(command, value)
         timeout = command.timeout if timeout is None else timeout
-        attempts = ATTEMPTS if command.repeatable else 1
         reply, echo = command.reply, command.echo
 
         def accept(answer: F) -> R:
@@ -188,17 +221,17 @@ class Link(Generic[F]):
             return decoded
 
         self._check()
-        waiter = self._pending.expect(frame.key, accept)
         if not urgent:
             await self._turn(frame.key, IMMEDIATE_RANK, timeout, command.name)
 
         try:
-            answer: R = await self._exchange(frame, waiter, command.name, timeout, attempts)
+            if not urgent:
+                await self.calm(frame.key)
+
+            return await self._exchange(frame, accept, command.name, timeout, repeatable=command.repeatable)
         finally:
             if not urgent:
-                self._turns.give(frame.key, quiet=waiter.quiet)
-
-        return answer
+                self._turns.give(frame.key)
 
     async def post(self, frame: F, accept: Callable[[F], R], *, name: str, timeout: float) -> Posted[R]:
         """Sends the frame of a queued command; its answer is awaited with the `Posted` that is returned.
@@ -214,7 +247,7 @@ class Link(Generic[F]):
         self._check()
         await self._turn(None, QUEUED_RANK, timeout, name)
         waiter = self._pending.expect(frame.key, accept, tombstone=False)
-        posted: Posted[R] = Posted(self, name, waiter, partial(self._turns.give, None))
+        posted: Posted[R] = Posted(self, name, waiter, self._round_trip, partial(self._turns.give, None))
         try:
             waiter.sent()
             self._stats.sent += 1
@@ -229,9 +262,30 @@ class Link(Generic[F]):
 
         return posted
 
+    def overdue(self) -> None:
+        """Takes note that a request went unanswered for the reply timeout."""
+        self._round_trip.unanswered()
+        self._unanswered = min(self._unanswered + 1, MUTE)
+
+    async def calm(self, key: Hashable) -> None:
+        """Returns when no second answer to a request of this key can arrive: it would pass for the next one's.
+
+        Either the request or its answer may have been doubled on the way, so it takes the disorder of both ways.
+        """
+        heard = self._heard.get(key)
+        if heard is not None and self.disorder:
+            await asyncio.sleep(heard + 2 * self.disorder - self._loop.time())
+
+    async def opened(self) -> None:
+        """Returns when the link is open: at once, or when it has been reopened; raises ConnectionLost if it is dead."""
+        while self.state.value is LinkState.REOPENING:
+            await anext(self.state.__aiter__())
+
+        self._check()
+
     def answer(self, reply: asyncio.Future[R]) -> R:
         """Returns what was delivered, or raises ConnectionLost if it was the end of the link."""
-        value = reply.result()
+        value: R = reply.result()
         if isinstance(value, ConnectionLost):
             raise self._lost() from self._cause
 
@@ -248,8 +302,8 @@ class Link(Generic[F]):
                 await self._transport.aclose()
 
     def _check(self) -> None:
-        """Raises ConnectionLost if the link is no longer open."""
-        if self.state is not LinkState.OPEN:
+        """Raises ConnectionLost if the link is dead."""
+        if self.state.value in DEAD:
             raise self._lost() from self._cause
 
     def _lost(self) -> ConnectionLost:
@@ -265,24 +319,38 @@ class Link(Generic[F]):
 
     def _end(self, state: LinkState, cause: BaseException | None) -> None:
         """The one door of death; only the first cause counts."""
-        if self.state is not LinkState.OPEN:
+        if self.state.value in DEAD:
             return
 
-        self.state, self._cause = state, cause
+        self._cause = cause
+        self.state.change(state)
+        self.state.close()
         self._pending.fail(self._lost())
         self.events.close()
 
-    async def _exchange(self, frame: F, waiter: Waiter[F], name: str, timeout: float, attempts: int) -> Any:
-        """Sends a frame, again if it has to be, and returns what its waiter makes of the answer."""
-        started = self._loop.time()
-        with waiter:
-            for attempt in range(attempts):
-                until = started + timeout * (attempt + 1) / attempts
-                hurried = True
-                while hurried:
-                    reply, hurried = await self._ask(frame, waiter, until, repeatable=attempts > 1)
-                    if reply.done() and not reply.cancelled():
-                        return self.answer(reply)
+    async def _exchange(self, frame: F, accept: Callable[[F], R], name: str, timeout: float, *, repeatable: bool) -> R:
+        """Sends a frame, again and again if that is harmless, and returns what `accept` makes of its answer."""
+        deadline = self._loop.time() + timeout
+        attempts = 0
+        with self._pending.expect(frame.key, accept, repeatable=repeatable) as waiter:
+            while (left := deadline - self._loop.time()) > 0:
+                if not await self._opened_within(left):
+                    break
+
+                reply = self._listen(waiter, resync=attempts > 0)
+                attempts += 1
+                patience = min(left, self._round_trip.timeout) if repeatable else left
+                if not await self._ask(frame, waiter, reply, patience) or reply.result() is SWALLOWED:
+                    continue
+
+                if attempts == 1:
+                    self._round_trip.sample(self._loop.time() - waiter.sends[0])
+
+                return cast(R, self.answer(reply))
+
+            reply = self._listen(waiter, resync=True)
+            if reply.done() and reply.result() is not SWALLOWED:
+                return cast(R, self.answer(reply))
 
         if waiter.misfit:
             raise ProtocolError(f"{name}: the arm's answer does not fit: {waiter.misfit}")
@@ -290,36 +358,44 @@ class Link(Generic[F]):
         self._stats.timeouts += 1
         raise self._overdue(name, timeout)
 
-    async def _ask(
-        self, frame: F, waiter: Waiter[F], until: float, *, repeatable: bool
-    ) -> tuple[asyncio.Future[Any], bool]:
-        """Sends a frame once; returns its answer, if one came in time, and whether to ask again before that time."""
-        self._check()
-        reply = self._listen(waiter)
-        self._stats.sent += 1
-        self._stats.repeated += waiter.repeats
-        waiter.sent()
-        with suppress(TimeoutError):
-            async with asyncio.timeout_at(until) as limit:
-                if repeatable:
-                    waiter.hurry = partial(bring_forward, limit, self._loop)
-
-                await self._send(frame)
-                await reply
-
-        hurried = limit.when() != until
-        if not hurried and (not reply.done() or reply.cancelled()):
-            # The answer may have come inside of a frame that never ended.
-            reply = self._listen(waiter)
-            self._receive(self._parser.resync())
-
-        return reply, hurried
-
-    def _listen(self, waiter: Waiter[F]) -> asyncio.Future[Any]:
-        """What the waiter's next answer is delivered to."""
+    def _listen(self, waiter: Waiter[F], *, resync: bool) -> asyncio.Future[Any]:
+        """Returns where the next answer arrives; it may do so at once, out of what an incomplete frame held back."""
         reply: asyncio.Future[Any] = self._loop.create_future()
         waiter.listen(partial(deliver, reply))
+        if resync:
+            self._receive(self._parser.resync())
+
         return reply
+
+    async def _ask(self, frame: F, waiter: Waiter[F], reply: asyncio.Future[Any], patience: float) -> bool:
+        """Sends a frame, unless its answer is there already; returns whether there is one in time."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(patience):
+                if not reply.done():
+                    self._stats.sent += 1
+                    self._stats.repeated += bool(waiter.sends)
+                    waiter.sent()
+                    await self._send(frame)
+
+                await reply
+
+        if reply.done() and not reply.cancelled():
+            return True
+
+        self.overdue()
+        return False
+
+    async def _opened_within(self, seconds: float) -> bool:
+        """Whether the link is open, or is so before the seconds have passed."""
+        if self.state.value is LinkState.OPEN:
+            return True
+
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await self.opened()
+                return True
+
+        return False
 
     async def _turn(self, key: Hashable, rank: int, timeout: float, what: str) -> None:
         """Waits for the turn of a request, no longer than its own timeout."""
@@ -329,7 +405,7 @@ class Link(Generic[F]):
         except TimeoutError:
             raise ReplyTimeout(f"the link to {self.url} was too busy to send {what} within {timeout:.3g} s") from None
 
-        if self.state is not LinkState.OPEN:
+        if self.state.value in DEAD:
             self._turns.give(key)
             self._check()
 
@@ -338,65 +414,118 @@ class Link(Generic[F]):
         if self.trace:
             self.trace(True, frame)
 
+        data = bytes(frame)
+        if self._unanswered == MUTE:
+            self._unanswered = 0
+            data = self._filler + data
+
         try:
             async with self._sending:
-                await self._transport.send(bytes(frame))
-        except (anyio.BrokenResourceError, anyio.ClosedResourceError, OSError) as error:
+                await self._transport.send(data)
+        except BROKEN as error:
+            if self._reopen:
+                return  # as if it had been lost on the way: the reader finds the break, and mends it
+
             self._end(LinkState.LOST, error.__cause__ or error)
             raise self._lost() from error
 
     async def _read(self) -> None:
-        """Reads until the transport ends."""
+        """Reads until the transport ends, and from the next one if it may be reopened."""
         try:
             while True:
-                self._receive(self._parser.feed(await self._transport.receive()))
-        except (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceError, OSError) as error:
-            self._end(LinkState.LOST, error.__cause__ or error)
+                try:
+                    self._receive(self._parser.feed(await self._transport.receive()))
+                except BROKEN as error:
+                    if not self._reopen:
+                        self._end(LinkState.LOST, error.__cause__ or error)
+                        return
+
+                    await self._mend(self._reopen)
         except Exception as error:
             # A bug in a parser must not leave callers waiting for a reader that is gone.
             self._end(LinkState.LOST, error)
             raise
 
+    async def _mend(self, reopen: Callable[[], Awaitable[Transport]]) -> None:
+        """Opens the transport anew, as often as it takes, at growing intervals that differ from arm to arm."""
+        self.state.change(LinkState.REOPENING)
+        await self._transport.aclose()
+        pause = FIRST_PAUSE
+        while True:
+            try:
+                self._transport = await reopen()
+                break
+            except (ConnectFailed, OSError):
+                await asyncio.sleep(pause * random.uniform(0.5, 1.0))  # noqa: S311 - no secret
+                pause = min(2 * pause, LAST_PAUSE)
+
+        self._parser.reset()
+        self.outages += 1
+        self.state.change(LinkState.OPEN)
+
     def _receive(self, frames: list[F]) -> None:
         """Hands frames to those who wait for them."""
+        if frames:
+            self._unanswered = 0
+
+        now = self._loop.time()
         for frame in frames:
             self._stats.received += 1
+            self._heard[frame.key] = now
             if self.trace:
                 self.trace(False, frame)
 
             if not self._pending.resolve(frame):
                 self._stats.unexpected += 1
+                if self.stray:
+                    self.stray(frame)
+
                 self.events.publish(Unexpected(frame))
 
 
 class Posted(Generic[R]):
     """A queued command that was sent and is not answered yet."""
 
-    def __init__(self, link: Link[Any], name: str, waiter: Waiter[Any], give_turn: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        link: Link[Any],
+        name: str,
+        waiter: Waiter[Any],
+        round_trip: RoundTrip,
+        give_turn: Callable[[], None],
+    ) -> None:
         self._link = link
+        self._round_trip = round_trip
         self._name = name
         self._waiter = waiter.__enter__()
         self._give_turn: Callable[[], None] | None = give_turn
         self._reply: asyncio.Future[R] = asyncio.get_running_loop().create_future()
         waiter.listen(partial(deliver, self._reply))
 
-    async def answer(self, timeout: float) -> R:
+    async def answer(self) -> R:
         """Returns what `accept` made of the answer.
 
         Raises:
-            ReplyTimeout: No answer came within so many seconds.
+            ReplyTimeout: No answer came within the link's own timeout.
             ConnectionLost: The link is gone.
         """
         try:
-            async with asyncio.timeout(timeout):
+            async with asyncio.timeout(self._round_trip.timeout):
                 await self._reply
         except TimeoutError:
             if not self._reply.done() or self._reply.cancelled():
-                raise ReplyTimeout(f"{self._name} was not acknowledged within {timeout:.3g} s") from None
+                self._link.overdue()
+                raise ReplyTimeout(f"{self._name} was not acknowledged") from None
         finally:
             self.forget()
 
+        self._round_trip.sample(asyncio.get_running_loop().time() - self.sent_at)
         return self._link.answer(self._reply)
+
+    @property
+    def sent_at(self) -> float:
+        """When it was sent, in the loop's seconds."""
+        return self._waiter.sends[0]
 
     def forget(self) -> None:
         """Stops waiting; may be called again."""
@@ -404,13 +533,6 @@ class Posted(Generic[R]):
         if give_turn:
             self._waiter.__exit__()
             give_turn()
-
-
-def bring_forward(limit: asyncio.Timeout, loop: asyncio.AbstractEventLoop) -> None:
-    """Shortens a wait to `HURRY`, if it goes on longer."""
-    when = limit.when()
-    if when is not None and not limit.expired():
-        limit.reschedule(min(when, loop.time() + HURRY))
 
 
 def deliver(reply: asyncio.Future[Any], value: Any) -> None:

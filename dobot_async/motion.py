@@ -28,9 +28,9 @@ __all__ = ["Motion", "MotionQueue", "undisturbed"]
 
 T = TypeVar("T")
 Q = TypeVar("Q")
-POLL = 0.004
+POLL = 0.003
 ALARM_POLLS = 12  # the alarms are also read at every so many polls, for a motion that an alarm keeps from ending
-SILENCES = 3  # polls in a row that nobody answers, each with its own repetitions, until the arm counts as lost
+REFUSALS = 20  # in a row; each was settled, so that nothing is under way
 
 
 class Motion:
@@ -99,13 +99,17 @@ class MotionQueue:
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
+        executor.distress = self._distress
+        self._giving_up: set[asyncio.Task[None]] = set()
         self._order = anyio.Lock(fast_acquire=True)
         self._left = 0
         self._pending: deque[Motion] = deque()
         self._entering: dict[Entry, Motion] = {}
         self._stops = 0
+        self._stopping = 0
         self._stopped: DobotError = MotionStopped("the arm was stopped")
         self._watchers = 0
+        self._crowded = False
         self._poller: asyncio.Task[None] | None = None
         self._observed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
@@ -142,6 +146,7 @@ class MotionQueue:
     async def put_all(self, batch: Mapping[Entry, Motion], *, timeout: float | None = None) -> None:
         """Gives several commands to the arm's queue with nothing between them; see `put`."""
         stops = self._stops
+        refusals = 0
         self._entering.update(batch)
         entries = list(batch)
         failure: DobotError = MotionStopped("it was not sent: the call that put it was cancelled")
@@ -150,14 +155,23 @@ class MotionQueue:
                 await self._order.acquire()
 
             try:
+                if self._executor.under_way:
+                    await self._executor.settle()
+
                 while entries:
                     async with asyncio.timeout_at(limit.when()):
-                        await self._room()
+                        await self._executor.connected()
+                        await self._room(stops)
 
-                    self._check(stops)
-                    count = min(self._left, len(entries))
-                    await self._executor.push(entries[:count], self._accepted)
-                    del entries[:count]
+                    sent = len(entries)
+                    await self._executor.push(entries[: self._left], self._accepted)
+                    entries = [entry for entry in entries if entry in self._entering]
+                    refusals = 0 if len(entries) < sent else refusals + 1
+                    if refusals:
+                        self._left = 0
+
+                    if refusals == REFUSALS:
+                        raise ReplyTimeout(f"the arm answers, but did not take {entries[0].command.name}")
             finally:
                 self._order.release()
         except DobotError as error:
@@ -180,6 +194,11 @@ class MotionQueue:
         for motion in list(self._pending):
             await motion.wait(timeout)
 
+    async def update(self) -> None:
+        """Asks the arm once how far it is, and ends the Motions that this decides."""
+        if self._pending:
+            await self._observe(alarms=True)
+
     async def pause(self) -> None:
         """Lets the arm finish the command that it executes, and then wait; Motions stay pending."""
         await self._executor.pause()
@@ -199,6 +218,10 @@ class MotionQueue:
     def fail(self, error: DobotError) -> None:
         """Ends all Motions, and the puts that wait for room, with an error."""
         self._refuse(error)
+        self._end_all(error)
+
+    def _end_all(self, error: DobotError) -> None:
+        """Ends all Motions that are pending or under way."""
         pending, self._pending = self._pending, deque()
         for motion in pending:
             motion.end(error)
@@ -212,9 +235,12 @@ class MotionQueue:
     async def aclose(self) -> None:
         """Ends the poller and all Motions; the arm is left as it is."""
         self.fail(MotionStopped("the connection's block ended before the motion was known to be done"))
-        if self._poller:
-            self._poller.cancel()
-            await asyncio.wait([self._poller])
+        tasks = self._giving_up | ({self._poller} if self._poller else set())
+        for task in tasks:
+            task.cancel()
+
+        if tasks:
+            await asyncio.wait(tasks)
 
     @asynccontextmanager
     async def exclusively(self) -> AsyncIterator[None]:
@@ -253,18 +279,18 @@ class MotionQueue:
         if self._stops != stops:
             raise self._stopped.with_traceback(None)
 
-    async def _room(self) -> None:
+    async def _room(self, stops: int) -> None:
         """Returns when the arm's queue has room: asked only when what was counted down is used up."""
-        stops = self._stops
-        if not self._left:
-            self._left = await self._executor.left_space()
-
+        self._check(stops)
         while not self._left:
-            with self.watching():
-                await asyncio.shield(self._observed)
-
-            self._check(stops)
             self._left = await self._executor.left_space()
+            self._check(stops)
+            if not self._left:
+                self._crowded = True
+                with self.watching():
+                    await asyncio.shield(self._observed)
+
+                self._check(stops)
 
     def _refuse(self, error: DobotError) -> None:
         """From now on nothing is sent any more that was put before."""
@@ -274,14 +300,27 @@ class MotionQueue:
     async def _stop(self, error: DobotError, *, halt: bool = True) -> None:
         """Stops, ends all Motions, waits for the put that is under way, and empties the queue behind it."""
         self._refuse(error)
-        if halt:
-            await self._executor.halt()
+        self._stopping += 1
+        try:
+            if halt:
+                await self._executor.halt()
 
-        self.fail(error)
-        async with self._order:
-            await self._executor.reset()
             self.fail(error)
-            self._left = 0
+            async with self._order:
+                await self._executor.reset()
+                self._end_all(error)  # what was under way; who puts from now on waits for this lock, and goes on
+                self._left = 0
+        except DobotError as failure:
+            self.fail(failure)
+            raise
+        finally:
+            self._stopping -= 1
+
+    def _distress(self, error: MotionUnknown) -> None:
+        """Gives up although nobody asks just now."""
+        task = asyncio.create_task(self._give_up(error), name="dobot_async stop")
+        self._giving_up.add(task)
+        task.add_done_callback(self._giving_up.discard)
 
     async def _give_up(self, error: DobotError) -> None:
         """Stops the arm because of an error that nobody can mend, as far as the link still allows."""
@@ -292,21 +331,20 @@ class MotionQueue:
 
     async def _poll(self) -> None:
         """Observes the arm while somebody waits."""
-        silences = polls = 0
+        polls = 0
         while self._watchers:
             try:
+                await self._executor.connected()
                 await self._observe(alarms=polls % ALARM_POLLS == 0)
-                silences = 0
             except ReplyTimeout as error:
-                silences += 1
-                if silences == SILENCES:
-                    self.fail(ConnectionLost(f"the arm no longer answers: {error}"))
+                self.fail(ConnectionLost(f"the arm no longer answers: {error}"))
             except MotionUnknown as error:
                 await self._give_up(error)
             except DobotError as error:
                 self.fail(error)
 
             polls += 1
+            self._crowded = False
             self._tell()
             await asyncio.sleep(POLL)
 
@@ -316,17 +354,26 @@ class MotionQueue:
             async with self._order:
                 await self._executor.settle()
 
+        # What a stop ends the arm ticks off as it does what is done; nothing that is read while it goes on tells which.
+        stops = self._stops
         ticket = await self._executor.completed()
+        if self._stopping or self._stops != stops:
+            return
+
         reached = [] if ticket is None else [motion for motion in self._pending if (motion.index or 0) <= ticket]
         if not (reached or alarms):
             return
 
         faults = await self._executor.faults()
+        if self._stopping or self._stops != stops:
+            return
+
         for motion in reached:
             if not (faults and motion.moves):
                 motion.end()
 
-        if faults and any(motion.moves and not motion.done for motion in self._pending):
+        # What takes up the room of an alarmed arm may be a command whose put was cancelled, and nobody's Motion.
+        if faults and (self._crowded or any(motion.moves and not motion.done for motion in self._pending)):
             await self._alarmed(reached, faults)
 
         while self._pending and self._pending[0].done:
@@ -339,13 +386,15 @@ class MotionQueue:
         alarms were last seen clear, the last has failed; of another, only an arm that stands where it led shows that it
         has not.
         """
+        text = "; ".join(map(str, faults))
+        error = ArmAlarm(f"the arm raised alarms: {text}", faults)
+        self._refuse(error)
         await self._executor.halt()
         for motion in [motion for motion in reached if motion.moves][:-1]:
             if await self._executor.stands_at(motion.entry):
                 motion.end()
 
-        text = "; ".join(map(str, faults))
-        await self._stop(ArmAlarm(f"the arm raised alarms: {text}", faults))
+        await self._stop(error, halt=False)
 
     def _tell(self) -> None:
         """Wakes those who wait for the next observation."""

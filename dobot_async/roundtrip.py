@@ -2,17 +2,19 @@
 
     first sample r:    srtt = r                        rttvar = r / 2
     later ones:        rttvar += (|srtt - r| - rttvar) / 4         srtt += (r - srtt) / 8
-    timeout:           srtt + 4 * rttvar, within floor and ceiling; longer by half after each that passed unanswered
+    timeout:           srtt + max(4 * rttvar, 10 ms), within floor and ceiling; a quarter longer after each that passes
 
-Only requests that were sent once give a sample: the answer to one that was sent again could belong to either.
+Only requests that were sent once give a sample: the answer to one that was sent again could belong to either. Until
+there is one, a timeout that has grown stays as it is, so that a link that has become slower is measured at last.
 """
 
 from __future__ import annotations
 
 __all__ = ["RoundTrip"]
 
-INITIAL = 0.5
-GROWTH = 1.5
+INITIAL = 0.1
+GRAIN = 0.01  # however even the round trips are, the next one may be a little longer
+GROWTH = 1.25
 
 
 class RoundTrip:
@@ -30,21 +32,25 @@ class RoundTrip:
         self._floor = floor
         self._ceiling = ceiling
         self._variation = 0.0
+        self._growth = 1.0
+
+    @property
+    def timeout(self) -> float:
+        """Seconds to wait for the next answer."""
+        base = INITIAL if self.smoothed is None else max(self.smoothed + max(4 * self._variation, GRAIN), self._floor)
+        return min(base * self._growth, self._ceiling)
+
+    def unanswered(self) -> None:
+        """Takes note that a timeout has passed."""
+        if self.timeout < self._ceiling:
+            self._growth *= GROWTH
 
     def sample(self, seconds: float) -> None:
         """Takes the round trip of a request that was sent once."""
+        self._growth = 1.0
         if self.smoothed is None:
             self.smoothed, self._variation = seconds, seconds / 2
             return
 
         self._variation += (abs(self.smoothed - seconds) - self._variation) / 4
         self.smoothed += (seconds - self.smoothed) / 8
-
-    def timeout(self, unanswered: int = 0) -> float:
-        """Returns the seconds to wait, after so many requests in a row that nobody answered."""
-        if self.smoothed is None:
-            base = min(INITIAL, self._ceiling)
-        else:
-            base = min(max(self.smoothed + 4 * self._variation, self._floor), self._ceiling)
-
-        return min(base * GROWTH**unanswered, self._ceiling)

@@ -48,24 +48,12 @@ class Turns:
 
             raise
 
-    def give(self, key: Hashable, *, quiet: float = 0.0) -> None:
-        """Gives the turn back, and lets those go on who can; the key stays busy for so many seconds."""
+    def give(self, key: Hashable) -> None:
+        """Gives the turn back, and lets those go on who can."""
         self._free += 1
-        if quiet:
-            asyncio.get_running_loop().call_later(quiet, self._end_quiet, key)
-        else:
-            self._busy.discard(key)
-
-        self._next()
-
-    def _end_quiet(self, key: Hashable) -> None:
         self._busy.discard(key)
-        self._next()
-
-    def _next(self) -> None:
-        """Lets those go on who can; who was cancelled takes itself out."""
         for turn in list(self._waiting):
-            if self._may(turn.key) and not turn.granted.done():
+            if self._may(turn.key) and not turn.granted.done():  # who was cancelled takes itself out
                 self._waiting.remove(turn)
                 self._grant(turn.key)
                 turn.granted.set_result(None)

@@ -26,7 +26,7 @@ LAYERS = (
     ("motion",),
     FAMILIES,
     ("simulator",),
-    ("cli",),
+    ("cli", "pytest_plugin"),
     ("__main__",),
 )
 LAYER = {name: number for number, names in enumerate(LAYERS) for name in names}

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Awaitable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 from typing import Any, Literal, Self, TypeVar
 
 import anyio
@@ -23,6 +24,7 @@ from dobot_async.magician.queue import MagicianQueue
 from dobot_async.magician.reach import check_reach as check_target
 from dobot_async.magician.verbs import Verbs
 from dobot_async.motion import undisturbed
+from dobot_async.roundtrip import RoundTrip
 from dobot_async.transports import Transport, open_transport
 from dobot_async.wire import Command, Queueing
 
@@ -100,7 +102,8 @@ class Magician(Verbs[Awaitable[None]]):
         self.link = link
         self.kinematics = Kinematics()
         self._check_reach = check_reach
-        self.queue = MagicianQueue(MagicianExecutor(link, window, self._check))
+        self._executor = MagicianExecutor(link, window, self._check)
+        self.queue = MagicianQueue(self._executor)
 
     @classmethod
     @asynccontextmanager
@@ -114,6 +117,8 @@ class Magician(Verbs[Awaitable[None]]):
         on_error: Literal["stop", "leave"] = "stop",
         window: int = 1,
         check_reach: bool = False,
+        reconnect: bool = False,
+        reply_timeout: float | tuple[float, float] = (0.02, 0.5),
     ) -> AsyncIterator[Self]:
         """Connects to an arm for the length of a block.
 
@@ -129,6 +134,10 @@ class Magician(Verbs[Awaitable[None]]):
                 cancellation; "leave" lets it finish.
             window: How many queued commands may be unacknowledged at a time, on links that allow more than one.
             check_reach: Refuse targets that the arm cannot reach before they are sent, with the reason.
+            reconnect: Reopen a link that breaks. The arm goes on with its queue meanwhile; reads wait within their
+                timeout; Motions resolve if it is still the same run of the arm, else they raise MotionUnknown.
+            reply_timeout: Seconds without an answer after which a request is sent again: the least and the most that it
+                may adapt itself to, or one fixed value.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -137,13 +146,24 @@ class Magician(Verbs[Awaitable[None]]):
         if window < 1 or queue not in {"fresh", "keep"} or on_error not in {"stop", "leave"}:
             raise ValueError('expected window >= 1, queue "fresh" or "keep", on_error "stop" or "leave"')
 
+        floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
+        round_trip = RoundTrip(floor, ceiling)
         loop = asyncio.get_running_loop()
         deadline = loop.time() + timeout
         transport = await opened(url, timeout)
-        link = Link(transport, frame.Parser(), frame.request, url=url, read_only=not control)
+        link = Link(
+            transport,
+            frame.Parser(),
+            frame.request,
+            url=url,
+            filler=frame.FILLER,
+            read_only=not control,
+            round_trip=round_trip,
+            reopen=partial(opened, url, timeout) if reconnect else None,
+        )
         arm = cls(link, window=min(window, transport.window), check_reach=check_reach)
         try:
-            await arm._greet(deadline - loop.time(), fresh=control and queue == "fresh")
+            await arm._greet(deadline - loop.time(), fresh=control and queue == "fresh", remember=control and reconnect)
         except BaseException:
             await undisturbed(arm._close())
             raise
@@ -199,6 +219,7 @@ class Magician(Verbs[Awaitable[None]]):
 
     async def clear_alarms(self, *, timeout: float | None = None) -> None:
         """Clears the alarms; what the arm was doing when they came up does not go on. Manual 2.5.2."""
+        await self.queue.update()  # without its alarm a motion that failed looks like one that is done
         await self.link.request(c.CLEAR_ALL_ALARMS_STATE, None, timeout=timeout)
 
     async def recover(self) -> None:
@@ -322,15 +343,19 @@ class Magician(Verbs[Awaitable[None]]):
         if self._check_reach:
             check_target(self.kinematics, value)
 
-    async def _greet(self, timeout: float, *, fresh: bool) -> None:
+    async def _greet(self, timeout: float, *, fresh: bool, remember: bool) -> None:
         """Proves that an arm answers, with a read that tells its end effector, and readies its queue."""
         try:
-            bias = await self.link.request(c.GET_END_EFFECTOR_PARAMS, None, timeout=timeout)
-            self.kinematics = Kinematics(bias.x_bias, bias.y_bias, bias.z_bias)
-            if fresh:
-                await self.link.request(c.SET_QUEUED_CMD_CLEAR, None)
-                await self.link.request(c.SET_QUEUED_CMD_START_EXEC, None)
-        except DobotError as error:
+            async with asyncio.timeout(timeout):
+                bias = await self.link.request(c.GET_END_EFFECTOR_PARAMS, None, timeout=timeout)
+                self.kinematics = Kinematics(bias.x_bias, bias.y_bias, bias.z_bias)
+                if remember:
+                    await self._executor.remember()
+
+                if fresh:
+                    await self._executor.reset()
+                    await self._executor.left_space()
+        except (DobotError, TimeoutError) as error:
             raise silent(self.link) from error
 
     async def _leave(self) -> None:

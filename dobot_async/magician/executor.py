@@ -1,9 +1,10 @@
-"""How a Magician takes queued commands: each gets the next index, and that proves what became of it.
+"""How a Magician takes queued commands, each exactly once, whatever the link does. docs/exactly-once.md has the proof.
 
-Books are kept of `last`, the index of the last command that the arm is known to have taken. They are opened with a
-WAIT of 0 ms, whose index is the first entry. An acknowledgement with the index `last + 1` is the next command's own;
-one with a smaller index is late or doubled and belongs to nobody. When none comes, another WAIT of 0 ms is queued: its
-index tells how many commands the arm took since `last`, and so whether to go on or to send again. Manual 2.2.1, 2.19.7.
+    push --> sent --acknowledged with the next index--> taken
+               |
+               `--silence--> settle: count by reading, then probe --> taken | not taken | MotionUnknown
+
+Manual 2.2.1 (3), 2.19.
 """
 
 from __future__ import annotations
@@ -19,36 +20,74 @@ from dobot_async.executor import Accepted, Entry
 from dobot_async.link import Link, Posted
 from dobot_async.magician import commands as c
 from dobot_async.magician.alarms import Alarm, decode, faults
+from dobot_async.magician.books import Attempt, Books, Verdict
 from dobot_async.magician.frame import Frame
-from dobot_async.magician.reach import destination
+from dobot_async.magician.reach import destination, is_relative
 from dobot_async.wire import Command, Number, u64
 
-__all__ = ["MagicianExecutor"]
+__all__ = ["MagicianExecutor", "Surplus"]
 
 Q = TypeVar("Q")
 INDEX: Number[int] = Number(u64)
-ACKNOWLEDGE = 0.5
-ATTEMPTS = 4
+BUSY = 0.5  # seconds that a queued command waits for its turn on the link
+SILENCE = 5.0  # seconds without an answer after which the arm counts as lost, and what is under way as unknown
+GARBAGE = 1 << 32  # an index so far beyond the last one is what some firmware shows while it moves
+SAME_RUN = 0.95  # of the seconds that have passed, the arm's own clock has counted at least so many
+PROBES = 30  # in a row, none acknowledged although the arm answers what it is asked
 ARRIVED = 0.5  # mm and degrees
+
+
+class Surplus:
+    """An event: the arm took more commands than were sent, but only such as may be done twice.
+
+    Attributes:
+        count: How many more.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+    def __repr__(self) -> str:
+        return f"<Surplus of {self.count} queued commands: doubled by the network, or queued by somebody else>"
 
 
 class MagicianExecutor:
     """The arm's own queue, over a link."""
 
     def __init__(self, link: Link[Frame], window: int, check: Callable[[Any], None]) -> None:
+        self.distress: Callable[[MotionUnknown], None] = lambda _: None
         self._link = link
-        self._check = check
         self._window = window
-        self._last: int | None = None
+        self._check = check
+        self._books = Books()
         self._heard = -1
-        self._completed: int | None = None
-        self._under_way: deque[Entry] = deque()
+        self._completed = -1
+        self._cleared = -1
+        self._outages = 0
+        self._uptime: tuple[float, float] | None = None
+        self._capacity: int | None = None
+        self._empty = False
+        self._left = 0
+        self._relative: str | None = None
+        self._controlled_at = self._queued_at = -math.inf
         self._accepted: Accepted = lambda _entry, _ticket: None
+        link.stray = self._stray
 
     @property
     def under_way(self) -> Collection[Entry]:
         """The commands that were sent and not acknowledged."""
-        return self._under_way
+        return self._books.entries
+
+    async def connected(self) -> None:
+        """Returns when the link is open, and after an outage when the arm is known to be in the same run as before."""
+        await self._link.opened()
+        if self._outages != self._link.outages:
+            await self._recognise()
+            self._outages = self._link.outages
+
+    async def remember(self) -> None:
+        """Notes the arm's clock, so that it can be told after an outage whether it was switched off. V1.1."""
+        self._uptime = await self._read_uptime(), self._now()
 
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
         """Returns a checked and encoded command."""
@@ -57,50 +96,56 @@ class MagicianExecutor:
         return Entry(command, value, frame)
 
     async def left_space(self) -> int:
-        """Returns how many commands the arm's queue can still take. Manual 2.19.8."""
-        return await self._link.request(c.GET_QUEUED_CMD_LEFT_SPACE, None)
+        """Returns how many commands the arm's queue can still take; opens the books if it can. Manual 2.19.8."""
+        left = await self._read_left()
+        if left and self._books.last is None:
+            await self._open()
+            left -= 1
+
+        return left
 
     async def push(self, entries: Sequence[Entry], accepted: Accepted) -> None:
-        """Queues commands, each exactly once and in order; at most `window` are unacknowledged at a time."""
+        """Queues commands in order, at most `window` unacknowledged; returns early if the arm did not take them all."""
         await self.settle()
         self._accepted = accepted
-        if self._last is None:
-            self._last = await (await self._post(self._wait())).answer(ACKNOWLEDGE)
+        if self._books.last is None:
+            await self._open()
 
-        todo = deque(entries)
-        window = self._window
-        for _ in range(ATTEMPTS):
-            try:
-                return await self._stream(todo, window)
-            except ReplyTimeout:
-                window = 1
-                await self._count()
-                todo.extendleft(reversed(self._under_way))
-                self._under_way.clear()
-
-        raise ReplyTimeout(f"the arm took none of {ATTEMPTS} attempts to queue {todo[0].command.name}")
+        try:
+            await self._stream(deque(entries))
+        except ReplyTimeout:
+            await self._settle()
 
     async def settle(self) -> None:
         """Finds out what became of the commands under way."""
-        if self._under_way:
-            await self._count()
-            while self._under_way:
-                self._accepted(self._under_way.popleft(), None)
+        for entry in await self._settle():
+            self._accepted(entry, None)
 
     async def completed(self) -> int | None:
-        """Returns the index of the last finished command. Manual 2.19.7.
+        """Returns the index of the last finished command, None if the arm does not say. Manual 2.19.7."""
+        index = await self._index()
+        if index is None or self._books.last is None:
+            return None
 
-        An index beyond the last one given out says nothing: some firmware shows one while it moves.
-        """
-        index = await self._link.request(c.GET_QUEUED_CMD_CURRENT_INDEX, None)
-        if self._last is not None and index <= self._last:
-            self._completed = index
+        if self._link.disorder and index > self._completed:
+            # A doubled command shifts the indices of those behind it, so an index counts only if the sum is right.
+            surplus = await self._count()
+            if surplus is None or self._books.last is None:
+                return None
 
-        return self._completed
+            if surplus > 0 and not self._books.under_way:
+                self._books.last += surplus
+                self._surplus(surplus)
+
+        self._completed = max(self._completed, index)
+        if index == self._books.last and not self._books.under_way:
+            self._relative, self._empty = None, True
+
+        return index
 
     async def faults(self) -> Sequence[Alarm]:
         """Returns the alarms that keep the arm from moving. Manual 2.5.1."""
-        return faults(decode(await self._link.request(c.GET_ALARMS_STATE, None)))
+        return faults(decode(await self._link.request(c.GET_ALARMS_STATE, None, timeout=SILENCE)))
 
     async def stands_at(self, entry: Entry) -> bool:
         """Returns whether the arm stands where an absolute motion leads."""
@@ -115,53 +160,97 @@ class MagicianExecutor:
     async def halt(self) -> None:
         """Stops the arm where it is, jogs included, ahead of everything else. Manual 2.19.3 and 2.10.4."""
         await asyncio.gather(
-            self._link.request(c.SET_QUEUED_CMD_FORCE_STOP_EXEC, None, urgent=True),
-            self._link.request(c.SET_JOG_CMD, c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE), urgent=True),
+            self._link.request(c.SET_QUEUED_CMD_FORCE_STOP_EXEC, None, timeout=SILENCE, urgent=True),
+            self._link.request(
+                c.SET_JOG_CMD, c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE), timeout=SILENCE, urgent=True
+            ),
         )
+        self._controlled_at = self._now()
 
     async def reset(self) -> None:
         """Empties the arm's queue and lets it run again. Manual 2.19.6 and 2.19.1."""
-        await self._link.request(c.SET_QUEUED_CMD_CLEAR, None, urgent=True)
-        await self._link.request(c.SET_QUEUED_CMD_START_EXEC, None, urgent=True)
-        if self._under_way:
+        await self._control(c.SET_QUEUED_CMD_CLEAR)
+        await self._control(c.SET_QUEUED_CMD_START_EXEC)
+        if self._books.under_way:
             # Whether the arm took them before it was cleared no longer matters, but the books have to be opened anew.
-            self._under_way.clear()
-            self._last = None
+            self._books = Books()
+
+        self._cleared = -1 if self._books.last is None else self._books.last
+        self._relative, self._empty = None, True
 
     async def pause(self) -> None:
         """Lets the arm finish the command that it executes, and then wait. Manual 2.19.2."""
-        await self._link.request(c.SET_QUEUED_CMD_STOP_EXEC, None)
+        await self._control(c.SET_QUEUED_CMD_STOP_EXEC)
 
     async def resume(self) -> None:
         """Lets the arm go on. Manual 2.19.1."""
-        await self._link.request(c.SET_QUEUED_CMD_START_EXEC, None)
+        await self._control(c.SET_QUEUED_CMD_START_EXEC)
 
     async def download(self, entries: Sequence[Entry], loops: int) -> None:
         """Stores commands in the arm's flash as a program. Manual 2.19.4 and 2.19.5."""
-        await self.push([], self._accepted)
+        await self.left_space()
+        await self.settle()
         await self._link.request(c.SET_QUEUED_CMD_START_DOWNLOAD, c.QueuedCmdStartDownload(loops, len(entries)))
         try:
             await self.push(entries, lambda _entry, _ticket: None)
         finally:
             await self._link.request(c.SET_QUEUED_CMD_STOP_DOWNLOAD, None, urgent=True)
 
-    async def _stream(self, todo: deque[Entry], window: int) -> None:
-        """Sends commands ahead of their acknowledgements, as many as the window allows."""
-        posted: deque[Posted[int]] = deque()
-        try:
-            while todo or posted:
-                if todo and len(posted) < window:
-                    entry = todo.popleft()
-                    self._under_way.append(entry)
-                    posted.append(await self._post(entry))
-                else:
-                    self._take(await posted.popleft().answer(ACKNOWLEDGE))
-        finally:
-            for each in posted:
-                each.forget()
+    async def _control(self, command: Command[None, None]) -> None:
+        """Sends a command that steers the queue, so late that no doubled one of those before can undo it."""
+        await self._sleep_until(self._controlled_at + self._link.disorder)
+        await self._link.request(command, None, timeout=SILENCE, urgent=True)
+        self._controlled_at = self._now()
 
-    async def _post(self, entry: Entry) -> Posted[int]:
-        return await self._link.post(entry.frame, self._index_of, name=entry.command.name, timeout=ACKNOWLEDGE)
+    async def _stream(self, todo: deque[Entry]) -> None:
+        """Sends commands in bursts of a window, and enters a burst once all of it is acknowledged.
+
+        An acknowledgement does not say whose it is: with one command of a burst lost, the next one's would pass for it.
+        """
+        while todo:
+            await self._verify()
+            posted: list[Posted[int]] = []
+            try:
+                while todo and len(posted) < self._window:
+                    posted.append(await self._post(todo.popleft()))
+
+                indices = [await each.answer() for each in posted]
+            finally:
+                for each in posted:
+                    each.forget()
+
+            self._queued_at = self._now()
+            if len(indices) > 1 and indices != list(range(indices[0], indices[0] + len(indices))):
+                raise MotionUnknown(f"commands of a burst got the indices {indices}: nothing tells which were taken")
+
+            for index in indices:
+                entry, surplus = self._books.acknowledge(index)
+                self._accepted(entry, index)
+                self._surplus(surplus)
+
+    async def _verify(self) -> None:
+        """Makes sure, on a link that doubles messages, that nothing was taken twice: it would pass for what comes next.
+
+        Either the command or its acknowledgement may be on its way a second time: it takes the disorder of both ways.
+        """
+        if not self._link.disorder or self._books.under_way:
+            return
+
+        await self._sleep_until(self._queued_at + 2 * self._link.disorder)
+        surplus = await self._count()
+        if surplus and self._books.last is not None:
+            self._books.last += surplus
+            self._surplus(surplus)
+
+    async def _post(self, entry: Entry, *, probe: bool = False, counted: int | None = None) -> Posted[int]:
+        """Sends a command, and enters it as under way."""
+        await self._sleep_until(self._controlled_at + self._link.disorder)
+        if is_relative(entry.value):
+            self._relative = entry.command.name
+
+        self._empty = False
+        self._books.under_way.append(Attempt(entry, self._now(), probe, counted))
+        return await self._link.post(entry.frame, self._index_of, name=entry.command.name, timeout=BUSY)
 
     def _index_of(self, frame: Frame) -> int:
         """The index in an acknowledgement; one that was heard already is late or doubled."""
@@ -172,43 +261,188 @@ class MagicianExecutor:
         self._heard = index
         return index
 
-    def _take(self, index: int) -> None:
-        """Enters into the books that the arm took the first command under way."""
-        if self._last is None or index != self._last + 1:
-            raise MotionUnknown(
-                f"{self._under_way[0].command.name} got the index {index} after {self._last}: another program queues "
-                "commands on this arm, or the network delivered one twice"
-            )
-
-        self._last = index
-        self._accepted(self._under_way.popleft(), index)
-
-    async def _count(self) -> None:
-        """Finds out how many of the commands under way the arm took, and enters them into the books."""
-        last = self._last
-        assert last is not None
-        names = ", ".join(entry.command.name for entry in self._under_way)
-        commands = list(self._under_way)
-        for _ in range(ATTEMPTS):
-            self._under_way.append(self._wait())
-            try:
-                index = await (await self._post(self._under_way[-1])).answer(ACKNOWLEDGE)
-            except ReplyTimeout:
-                continue
-
-            if index == last + len(self._under_way):
-                for taken in range(last + 1, index + 1):
-                    self._take(taken)
-            elif index == last + 1:
-                self._last = index
-                self._under_way = deque(commands)
-            else:
-                raise MotionUnknown(f"the arm took {index - last - 1} commands, and nothing tells which, of: {names}")
-
+    def _stray(self, frame: Frame) -> None:
+        """An acknowledgement that nobody waits for: late, or of a command that the network delivered twice."""
+        last = self._books.last
+        if not frame.queued or len(frame.params) != INDEX.struct.size or last is None or self._books.under_way:
             return
 
-        raise MotionUnknown(f"the arm does not tell which it took of: {names}")
+        index = INDEX.decode(frame.params)
+        if last < index < last + GARBAGE:
+            self._heard = max(self._heard, index)
+            self._books.last = index
+            try:
+                self._surplus(index - last)
+            except MotionUnknown as error:
+                self.distress(error)
 
-    def _wait(self) -> Entry:
-        """The harmless command whose index tells how many were taken before it."""
-        return self.prepare(c.SET_WAIT_CMD, c.WAITCmd(0))
+    def _surplus(self, count: int) -> None:
+        """The arm took more than was sent: absolute motions may be done twice, nothing else."""
+        if count <= 0:
+            return
+
+        if self._relative:
+            raise MotionUnknown(
+                f"the arm took {count} commands more than were sent, and {self._relative} must not run twice: the "
+                "network doubled one, or another program queues commands on this arm"
+            )
+
+        self._link.events.publish(Surplus(count))
+
+    async def _open(self) -> None:
+        """Opens the books with the index of a WAIT of 0 ms, and of one more for each that went unacknowledged."""
+        previous, clean = None, True
+        silent_at = self._now() + SILENCE
+        while self._books.last is None:
+            index = await self._probe()
+            if index is not None and (clean or index - 1 == previous):
+                self._books.last = index
+            elif index is None and self._now() > silent_at:
+                raise ReplyTimeout("the arm does not acknowledge a WAIT of 0 ms; nothing was queued")
+
+            previous, clean = index, False
+
+        self._books.under_way = []
+
+    async def _settle(self) -> list[Entry]:
+        """Finds out what became of the commands under way, and enters it; returns those that the arm did not take."""
+        books = self._books
+        names = ", ".join(entry.command.name for entry in books.entries)
+        for _ in range(PROBES if books.under_way else 0):
+            if books.last is None:
+                break  # the arm was switched off and on
+
+            await self._sleep_until(books.under_way[-1].sent_at + self._link.disorder)
+            try:
+                await self._link.opened()
+                counted = await self._count()
+            except ReplyTimeout:
+                raise MotionUnknown(f"the arm fell silent and does not say whether it took {names}") from None
+
+            if counted is not None and not self._left:
+                # A probe would find no room.
+                probes = books.probes
+                verdict = books.conclude(counted)
+            else:
+                # What the count has found was acknowledged before the probe: if that comes now, it is late.
+                self._heard = max(self._heard, books.last + (counted or 0))
+                index = await self._probe(counted)
+                if index is None:
+                    continue
+
+                if books is not self._books:
+                    break  # somebody else found out meanwhile that the arm was switched off and on
+
+                probes = books.probes
+                verdict = books.prove(index, exact=not self._link.disorder)
+
+            if verdict is None:
+                raise MotionUnknown(f"the arm took some and lost some, and nothing tells which, of {names}")
+
+            return self._enter(verdict, probes)
+
+        if books.under_way:
+            raise MotionUnknown(f"the arm answers, but does not say whether it took {names}")
+
+        return []
+
+    def _enter(self, verdict: Verdict, probes: Sequence[Entry]) -> list[Entry]:
+        """Tells who put them which commands the arm took, and that probes take room; returns the others."""
+        for probe in probes:
+            self._accepted(probe, verdict.last)
+
+        for entry, index in verdict.taken:
+            self._accepted(entry, index)
+
+        self._surplus(verdict.surplus)
+        return verdict.lost
+
+    async def _probe(self, counted: int | None = None) -> int | None:
+        """Queues a WAIT of 0 ms; returns its index, None if it is not acknowledged."""
+        try:
+            posted = await self._post(self.prepare(c.SET_WAIT_CMD, c.WAITCmd(0)), probe=True, counted=counted)
+            return await posted.answer()
+        except ReplyTimeout:
+            return None
+        finally:
+            self._queued_at = self._now()
+
+    async def _count(self) -> int | None:
+        """Counts by reading how many commands the arm took since the last one in the books; None if it does not add up.
+
+        What it took is what it has finished, or was told to forget, and what lies in its queue. If a command is
+        finished between the two readings, the sum is too high where the queue was read first, and too low where it was
+        read last. What is queued, settled or cleared meanwhile makes them worthless.
+        """
+        if self._books.last is None or self._capacity is None:
+            return None
+
+        state, left = self._state(), await self._read_left()
+        while (finished := await self._index()) is not None:
+            last, _, cleared = state
+            if last is None:
+                return None
+
+            most = max(finished, cleared) + self._capacity - left - last
+            still = state == self._state()
+            if still and most <= 0:
+                return 0 if most == 0 else None
+
+            before, state, left = (state, left), self._state(), await self._read_left()
+            if still and before == (state, left) and state == self._state():
+                return most
+
+        return None
+
+    def _state(self) -> tuple[int | None, int, int]:
+        """What a count is made against."""
+        return self._books.last, len(self._books.under_way), self._cleared
+
+    async def _recognise(self) -> None:
+        """Raises MotionUnknown if the arm was switched off and on: its clock and its indices begin anew."""
+        await self._index()
+        if self._uptime is None:
+            return
+
+        uptime, read_at = self._uptime
+        await self.remember()
+        if self._uptime[0] < uptime + SAME_RUN * (self._uptime[1] - read_at):
+            raise self._restarted()
+
+    async def _read_uptime(self) -> float:
+        """Reads the seconds since power-up."""
+        return await self._link.request(c.GET_DEVICE_TIME, None, timeout=SILENCE) / 1000
+
+    def _restarted(self) -> MotionUnknown:
+        self._completed = self._heard = self._cleared = -1
+        self._books = Books(under_way=self._books.under_way)  # until `reset`: their Motions are still to be ended
+        return MotionUnknown("the arm was switched off and on: it counts its commands anew, and its queue is empty")
+
+    async def _read_left(self) -> int:
+        """Reads the left space; that of an empty queue is its capacity."""
+        empty = self._empty
+        self._left = await self._link.request(c.GET_QUEUED_CMD_LEFT_SPACE, None, timeout=SILENCE)
+        if empty and self._empty:
+            self._capacity = self._left
+
+        return self._left
+
+    async def _index(self) -> int | None:
+        """Reads the index of the last finished command; None where firmware shows nonsense instead."""
+        index = await self._link.request(c.GET_QUEUED_CMD_CURRENT_INDEX, None, timeout=SILENCE)
+        last = self._books.last
+        if last is not None and index > last + GARBAGE:
+            return None
+
+        if index < self._completed:
+            raise self._restarted()
+
+        return index
+
+    async def _sleep_until(self, when: float) -> None:
+        seconds = when - self._now()
+        if seconds > 0:
+            await asyncio.sleep(seconds)
+
+    def _now(self) -> float:
+        return asyncio.get_running_loop().time()

@@ -13,13 +13,14 @@ from typing import Any, NamedTuple
 
 from dobot_async.wire import Command, Queueing
 
-__all__ = ["MAX_PARAMS", "QUEUED", "WRITE", "Frame", "Parser", "encode", "request"]
+__all__ = ["FILLER", "MAX_PARAMS", "QUEUED", "WRITE", "Frame", "Parser", "encode", "request"]
 
 HEADER = b"\xaa\xaa"
 OVERHEAD = 4  # header, Len, Checksum
 MIN_LENGTH, MAX_LENGTH = 2, 250
 HEADER_LENGTH = 0xAA  # as a Len it is the third AA of a run: noise before a header, never sent by an arm
 MAX_PARAMS = 167
+FILLER = bytes(MAX_LENGTH + OVERHEAD)
 WRITE, QUEUED = 0b01, 0b10
 
 
@@ -96,6 +97,11 @@ class Parser:
             return []
 
         return self._scan(1, overdue=True)
+
+    def reset(self) -> None:
+        """Forgets the frame that is still incomplete: another stream begins."""
+        self.junk_bytes += len(self._buffer)
+        self._buffer.clear()
 
     def _scan(self, at: int, *, overdue: bool = False) -> list[Frame]:
         """Takes all frames out of the buffer, beginning at an offset.

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from dobot_async.magician import commands as c
 from dobot_async.magician.kinematics import Kinematics
 
-__all__ = ["Destination", "check_reach", "destination"]
+__all__ = ["Destination", "check_reach", "destination", "is_relative"]
 
 ANGLES = {c.PTPMode.JUMP_ANGLE, c.PTPMode.MOVJ_ANGLE, c.PTPMode.MOVL_ANGLE}
 INCREMENTS = {c.PTPMode.MOVJ_INC, c.PTPMode.MOVL_INC, c.PTPMode.MOVJ_XYZ_INC}
@@ -25,6 +25,17 @@ def destination(value: Any) -> Destination | None:
     """Returns where a command leads, None if that depends on where the arm will be, or if it leads nowhere."""
     find = DESTINATIONS.get(type(value))
     return find(value) if find else None
+
+
+def is_relative(value: Any) -> bool:
+    """Returns whether doing a command twice is more than doing it once: increments, jogs, distances, circles."""
+    if isinstance(value, (c.PTPCmd, c.PTPWithLCmd, c.PTPPOCmd, c.PTPPOWithLCmd)):
+        return value.ptp_mode in INCREMENTS
+
+    if isinstance(value, (c.CPCmd, c.CPLECmd)):
+        return value.cp_mode is c.CPMode.RELATIVE
+
+    return isinstance(value, (c.JOGCmd, c.EMotorS, c.CircleCmd))
 
 
 def check_reach(kinematics: Kinematics, value: Any) -> None:

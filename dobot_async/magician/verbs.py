@@ -121,7 +121,7 @@ class Verbs(Generic[T]):
 
     def wait(self, seconds: float, *, timeout: float | None = None) -> T:
         """Holds the arm's queue for a time, to the millisecond. Manual 2.14.1."""
-        return self.perform(c.SET_WAIT_CMD, c.WAITCmd(round(seconds * 1000)), timeout)
+        return self.perform(c.SET_WAIT_CMD, c.WAITCmd(milliseconds(seconds)), timeout)
 
     def wait_for_input(self, address: int, *, level: bool = True, timeout: float | None = None) -> T:
         """Holds the arm's queue until a digital input (1 to 20) has a level. Manual 2.15.1."""
@@ -181,3 +181,11 @@ class Verbs(Generic[T]):
         """Sets the ratios (0 to 100 percent) of all PTP motions from here on. Manual 2.11.4."""
         ratios = c.PTPCommonParams(velocity, velocity if acceleration is None else acceleration)
         return self.perform(c.SET_PTP_COMMON_PARAMS, ratios, timeout)
+
+
+def milliseconds(seconds: float) -> int:
+    """Whole milliseconds; raises ValueError where seconds are not finite or far too many."""
+    try:
+        return round(seconds * 1000)
+    except OverflowError:
+        raise ValueError(f"seconds must be in 0 to 4294967.295, not {seconds!r}") from None

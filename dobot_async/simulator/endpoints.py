@@ -12,7 +12,6 @@ import asyncio
 import itertools
 import math
 import os
-import tty
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from functools import partial
@@ -23,16 +22,18 @@ from weakref import WeakValueDictionary
 
 import anyio
 
-from dobot_async.simulator.faults import Channel, Faults
+from dobot_async.errors import ConnectFailed
+from dobot_async.simulator.faults import PROBABILITIES, TIMES, Channel, Faults
 from dobot_async.simulator.magician import Session, SimulatedMagician
 from dobot_async.transports.base import MANY, Transport, options
 
 __all__ = ["MODELS", "Simulation", "open_url", "simulate"]
 
 MODELS: dict[str, Callable[..., SimulatedMagician]] = {"magician": SimulatedMagician}
-FAULT_OPTIONS = dict.fromkeys(("loss", "corrupt", "dup", "split", "noise", "latency", "jitter"), float)
+FAULT_OPTIONS = dict.fromkeys((*PROBABILITIES, *TIMES), float)
 SILENCE = 1.0  # seconds after which a client that cannot be seen to leave counts as another one
 BUFFER = 1 << 16
+LEAST_DISORDER = 0.005
 
 names = itertools.count(1)
 running: WeakValueDictionary[str, Simulation] = WeakValueDictionary()
@@ -221,14 +222,19 @@ def address(scheme: str, name: tuple[Any, ...]) -> str:
 class MemoryTransport:
     """A client's end of a line in memory."""
 
-    in_flight = MANY
-    window = 16
-
     def __init__(self, simulation: Simulation, stack: AsyncExitStack | None = None) -> None:
         self._simulation = simulation
         self._stack = stack
+        self.in_flight, self.window = (1, 1) if self.disorder else (MANY, 16)
         self._arriving, self._arrived = anyio.create_memory_object_stream[bytes](BUFFER)
         self._client = simulation.client(self._deliver, self._arriving.close, ordered=True)
+
+    @property
+    def disorder(self) -> float:
+        """With jitter, overtaking or doubled messages it is a line for datagrams."""
+        faults = self._simulation.faults
+        disorder = faults.jitter + faults.reorder
+        return max(disorder, LEAST_DISORDER) if disorder or faults.dup else 0.0
 
     async def send(self, data: bytes) -> None:
         """Puts a request on the line."""
@@ -266,8 +272,11 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:
 
     if url.netloc:
         simulation = running.get(url.netloc)
-        if simulation is None or url.query:
-            raise ValueError(f"{url.geturl()}: no such simulation runs in this process; sim: makes one")
+        if url.query:
+            raise ValueError("a simulation that runs already takes no options")
+
+        if simulation is None:
+            raise ConnectFailed(f"{url.geturl()}: no such simulation runs in this process; sim: makes one")
 
         return MemoryTransport(simulation)
 
@@ -285,6 +294,8 @@ class PseudoTerminal:
         self._simulation = simulation
         self._loop = asyncio.get_running_loop()
         self._master, self._slave = os.openpty()
+        import tty  # noqa: PLC0415 - Windows has none, and needs none for the other endpoints
+
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)

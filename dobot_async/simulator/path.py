@@ -27,7 +27,7 @@ __all__ = ["Leg", "Solver", "curve_leg", "joint_leg", "jump", "travel"]
 REPEATED_POINTS, BAD_JUMP = 0x13, 0x15
 UNDERWAY = 0x10
 EVERY = 5.0  # mm or degrees between two looks at the reach
-MOST_LOOKS = 1000  # a way that is longer than so many looks leaves the reach of any arm on the first of them
+MOST_LOOKS = 1000  # a way of more than 5 m is looked at more seldom, for planning has to end
 HALVINGS = 40
 
 

@@ -18,10 +18,15 @@ class Transport(Protocol):
     Attributes:
         in_flight: How many requests may be unanswered at a time.
         window: How many queued commands may be unacknowledged at a time, whatever the user asks for.
+        disorder: Seconds within which messages may overtake one another, and a doubled one arrive again; 0 on a stream.
     """
 
     in_flight: int
     window: int
+
+    @property
+    def disorder(self) -> float:
+        """See above; it may change with the link."""
 
     async def send(self, data: bytes) -> None:
         """Sends all bytes of one frame; waits while the line cannot take them.
@@ -60,9 +65,10 @@ class Stream(Protocol):
 class Wrapped:
     """An anyio stream as a transport: its own three verbs, and the limits."""
 
-    def __init__(self, stream: Any, *, in_flight: int, window: int) -> None:
+    def __init__(self, stream: Any, *, in_flight: int, window: int, disorder: float = 0.0) -> None:
         self.in_flight = in_flight
         self.window = window
+        self.disorder = disorder
         self.send: Callable[[bytes], Any] = stream.send
         self.receive: Callable[[], Any] = stream.receive
         self.aclose: Callable[[], Any] = stream.aclose

@@ -60,6 +60,7 @@ class SerialTransport(asyncio.Protocol):
 
     in_flight = MANY
     window = WINDOW
+    disorder = 0.0
 
     def __init__(self) -> None:
         loop = asyncio.get_running_loop()

@@ -109,7 +109,7 @@ async def test_a_batch_left_by_an_error_sends_nothing() -> None:
         with pytest.raises(MotionStopped, match="not sent"):
             await motion
 
-        assert sim.arm.device.accepted == 0
+        assert done(sim, "SetPTPCmd") == []
 
 
 @pytest.mark.parametrize("capacity", [1, 2, 32])
@@ -182,6 +182,18 @@ async def test_an_alarmed_arm_refuses_motion_but_not_its_effector() -> None:
         await (await arm.queue.suction(False))
         with pytest.raises(ArmAlarm, match="0x40"):
             await arm.move_to(220, 0, 40)
+
+
+@virtual
+async def test_clearing_alarms_does_not_make_a_failed_motion_done() -> None:
+    async with simulate() as sim, Magician.connect(sim.url) as arm:
+        motion = await arm.queue.move_to(*TOO_FAR)
+        await asyncio.sleep(1)
+        await arm.clear_alarms()
+        with pytest.raises(ArmAlarm):
+            await motion
+
+        assert targets(sim) == []
 
 
 @virtual

@@ -302,10 +302,30 @@ def test_effectors() -> None:
     bench.ask(c.SET_END_EFFECTOR_GRIPPER, c.EndEffectorGripper(is_ctrl_enabled=True, is_gripped=True))
     bench.ask(c.SET_END_EFFECTOR_LASER, c.EndEffectorLaser(is_ctrl_enabled=True, is_on=True))
     assert (bench.arm.suction, bench.arm.gripper, bench.arm.laser) == (False, True, 100)
-    assert [(executed.index, executed.command) for executed in bench.arm.executed][-1] == (
-        None,
-        c.SET_END_EFFECTOR_LASER,
-    )
+    assert [(executed.index, executed.command) for executed in bench.arm.executed][-1:] == [
+        (None, c.SET_END_EFFECTOR_LASER)
+    ]
+    bench.ask(c.SET_END_EFFECTOR_GRIPPER, c.EndEffectorGripper(is_ctrl_enabled=False, is_gripped=True))
+    bench.ask(c.SET_END_EFFECTOR_LASER, c.EndEffectorLaser(is_ctrl_enabled=False, is_on=True))
+    assert (bench.arm.gripper, bench.arm.laser) == (False, 0)
+
+
+def test_queued_tools_and_outputs_are_seen_in_their_turn() -> None:
+    def looked_at(look: Callable[[SimulatedMagician], Any]) -> tuple[Any, Any]:
+        bench = Bench()
+        bench.put(c.SET_WAIT_CMD, c.WAITCmd(1000))
+        bench.put(c.SET_END_EFFECTOR_SUCTION_CUP, c.EndEffectorSuctionCup(is_ctrl_enabled=True, is_sucked=True))
+        bench.put(c.SET_END_EFFECTOR_GRIPPER, c.EndEffectorGripper(is_ctrl_enabled=True, is_gripped=True))
+        bench.put(c.SET_IODO, c.IODO(1, 1))
+        bench.put(c.SET_IOPWM, c.IOPWM(4, 1000, 25))
+        bench.put(c.SET_E_MOTOR, c.EMotor(0, is_enabled=True, speed=100))
+        return look(bench.after(0.9)), look(bench.after(0.1))
+
+    assert looked_at(lambda arm: arm.suction) == (False, True)
+    assert looked_at(lambda arm: arm.gripper) == (False, True)
+    assert looked_at(lambda arm: arm.output(1)) == (0, 1)
+    assert looked_at(lambda arm: arm.pwm(4).duty_cycle) == (0, 25)
+    assert looked_at(lambda arm: arm.motors[0].speed) == (0, 100)
 
 
 def test_end_effector_moves_the_tool_and_not_the_joints() -> None:
@@ -530,6 +550,14 @@ def test_an_alarm_ends_the_command_and_the_rest_is_up_to_the_options(
     assert at(bench, 200, 0, 0, 0)
 
 
+def test_limits_are_the_arms_own() -> None:
+    now = [0.0]
+    arm = SimulatedMagician(lambda: now[0], limits=JointLimits(j1=(-10, 10)))
+    value = c.PTPCmd(c.PTPMode.MOVJ_ANGLE, 11, 45, 45)
+    arm.session().receive(bytes(request(c.SET_PTP_CMD, c.SET_PTP_CMD.request.encode(value), queued=True)))
+    assert [alarm.code for alarm in arm.alarms] == [0x00, 0x12]
+
+
 def test_leaving_the_reach_on_the_way() -> None:
     bench = Bench()
     bench.move(c.PTPMode.MOVJ_XYZ, 20, -200, 0, -90)
@@ -645,11 +673,11 @@ def test_a_path_that_runs_dry_halts_and_goes_on() -> None:
         bench.after(20)
 
     assert [end - begin for begin, end in bench.times[1:]] == pytest.approx([2 * math.sqrt(0.1)] * 2, rel=1e-3)
-    bench.ask(c.SET_CP_COMMON_PARAMS, c.CPCommonParams(10, 100))
+    bench.ask(c.SET_CP_COMMON_PARAMS, c.CPCommonParams(10, 25))
     bench.put(c.SET_CP_CMD, c.CPCmd(c.CPMode.RELATIVE, -10, 10, 5))
     bench.after(20)
     assert bench.point[:3] == pytest.approx((220, 10, HOME[2] + 5), abs=1e-3)
-    assert bench.times[-1][1] - bench.times[-1][0] == pytest.approx(1.5 + 0.1, rel=1e-3)
+    assert bench.times[-1][1] - bench.times[-1][0] == pytest.approx(1.5 + 0.4, rel=1e-3)
 
 
 def test_a_path_leaves_joint_4_alone_unless_it_is_to_hold_r() -> None:
@@ -859,6 +887,9 @@ def test_the_parallelogram_folds_and_stretches() -> None:
     bench.after(60)
     assert bench.faults == {0x49}
     assert bench.joints[2] == pytest.approx(70)
+    bench.jog(c.JOGKey.BN_DOWN, joint=True)
+    bench.after(1)
+    assert bench.joints[1] == pytest.approx(0), "folded by joint 3, and not to be folded further by joint 2"
     bench.arm.guide_to(*Kinematics().forward(0, 50, 0, 0))
     bench.ask(c.CLEAR_ALL_ALARMS_STATE)
     bench.jog(c.JOGKey.BP_DOWN, joint=True)
@@ -1172,6 +1203,23 @@ def test_anything_is_survived_and_nothing_grows(
     assert len(bench.arm.state._registers) < 60 + 3 * 20 + 4
     assert len(bench.arm.executed) <= 50
     assert bench.arm.device.left_space <= capacity
+
+
+def test_planning_ends_however_far_the_way_goes_outside_of_the_reach(monkeypatch: pytest.MonkeyPatch) -> None:
+    checked = []
+    check = Kinematics.check
+
+    def counted(kinematics: Kinematics, x: float, y: float, z: float, r: float) -> Any:
+        checked.append((x, y, z, r))
+        return check(kinematics, x, y, z, r)
+
+    monkeypatch.setattr(Kinematics, "check", counted)
+    bench = Bench()
+    bench.ask(c.RESET_POSE, c.ResetPose(manual=True, rear_arm_angle=100, front_arm_angle=45))
+    bench.ask(c.SET_PTP_JUMP_PARAMS, c.PTPJumpParams(-1e6, 1e6))
+    bench.move(c.PTPMode.JUMP_XYZ, 200, 0, 0)
+    assert bench.outcomes[-1] == (c.SET_PTP_CMD, "alarm")
+    assert 100 < len(checked) < 5000
 
 
 def test_programs_do_not_grow_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:

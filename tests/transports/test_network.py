@@ -183,7 +183,7 @@ async def test_a_tcp_peer_that_hangs_up_ends_the_link(reset: bool) -> None:
             await call
 
         assert isinstance(lost.value.__cause__, ConnectionResetError if reset else anyio.EndOfStream)
-        assert link.state is LinkState.LOST
+        assert link.state.value is LinkState.LOST
         with pytest.raises(ConnectionLost):
             await link.request(c.GET_POSE, None)
 
@@ -276,7 +276,7 @@ async def test_udp_datagrams_are_a_stream(cut: Callable[[bytes], list[bytes]]) -
         call = asyncio.create_task(link.request(c.GET_POSE, None))
         await peer.answer(*cut(bytes(POSE_REPLY)))
         assert await call == POSE
-        assert link.state is LinkState.OPEN
+        assert link.state.value is LinkState.OPEN
 
 
 async def test_a_lost_datagram_is_mended_by_the_repetition() -> None:
@@ -309,7 +309,7 @@ async def test_a_closed_udp_port_is_silence_and_may_open_later() -> None:
             with pytest.raises(ReplyTimeout):
                 await link.request(c.GET_POSE, None, timeout=0.03)
 
-        assert link.state is LinkState.OPEN
+        assert link.state.value is LinkState.OPEN
         peer = await stack.enter_async_context(udp_peer(port=port))
         call = asyncio.create_task(link.request(c.GET_POSE, None))
         answering = asyncio.create_task(answer_all(peer))

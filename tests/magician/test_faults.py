@@ -1,0 +1,279 @@
+"""What the driver promises on a bad line, case by case, on a virtual clock."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+
+import pytest
+from virtual import virtual
+
+from dobot_async import ConnectFailed, Magician, MotionUnknown, PTPMode, ReplyTimeout
+from dobot_async.magician import commands as c
+from dobot_async.magician.executor import Surplus
+from dobot_async.magician.frame import Parser
+from dobot_async.simulator import DeviceOptions, Faults, Simulation, simulate
+from dobot_async.transports import Transport
+
+Spoil = Callable[[bytes], list[tuple[float, bytes]]]
+
+
+class BadLine:
+    """A line to a simulation in memory on which a test decides what becomes of each message."""
+
+    in_flight = window = 1
+
+    def __init__(self, inner: Transport, *, disorder: float = 0.0) -> None:
+        self.disorder = disorder
+        self.request: Spoil = lambda data: [(0, data)]
+        self.reply: Spoil = lambda data: [(0, data)]
+        self._inner = inner
+        self._arrived: asyncio.Queue[bytes] = asyncio.Queue()
+        self._pump = asyncio.create_task(self._read())
+
+    async def _read(self) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            message = await self._inner.receive()
+            for delay, data in self.reply(message):
+                loop.call_later(delay, self._arrived.put_nowait, data)
+
+    async def send(self, data: bytes) -> None:
+        """Sends what is left of a message."""
+        for delay, each in self.request(data):
+            assert delay == 0
+            await self._inner.send(each)
+
+    async def receive(self) -> bytes:
+        """Returns the next message that has arrived."""
+        return await self._arrived.get()
+
+    async def aclose(self) -> None:
+        """Closes the line."""
+        self._pump.cancel()
+        await asyncio.wait([self._pump])
+        await self._inner.aclose()
+
+
+@pytest.fixture
+def lines(monkeypatch: pytest.MonkeyPatch) -> list[BadLine]:
+    """The bad lines over which `sim://` is reached from now on."""
+    from dobot_async.magician import arm
+    from dobot_async.transports import open_transport
+
+    made: list[BadLine] = []
+
+    async def opened(url: str, *, arm: str) -> Transport:
+        made.append(BadLine(await open_transport(url, arm=arm)))
+        return made[-1]
+
+    monkeypatch.setattr(arm, "open_transport", opened)
+    return made
+
+
+def targets(sim: Simulation) -> list[float]:
+    """The x of the PTP commands that the arm has executed."""
+    return [each.value.x for each in sim.arm.executed if each.outcome == "done" and each.name == "SetPTPCmd"]
+
+
+def spoil_once(number: int, into: list[tuple[float, bytes]]) -> Spoil:
+    """Does something to the first message of a command, and nothing to the others."""
+    left = [into]
+
+    def spoil(data: bytes) -> list[tuple[float, bytes]]:
+        frames = Parser().feed(data)
+        return left.pop() if left and any(frame.id == number for frame in frames) else [(0, data)]
+
+    return spoil
+
+
+@virtual
+async def test_a_thousand_moves_on_a_terrible_line() -> None:
+    faults = Faults(loss=0.2, corrupt=0.05, dup=0.05, latency=0.002, jitter=0.005)
+    options = DeviceOptions(capacity=8)
+    async with (
+        simulate(faults=faults, seed=1, speed=20, options=options) as sim,
+        Magician.connect(sim.url, timeout=30) as arm,
+    ):
+        for step in range(1000):
+            await arm.queue.move_to(200 + step / 64, 40 * (-1) ** step, 40)
+
+        await arm.queue.join()
+        executed = targets(sim)
+        # A request that the network doubles is executed twice, directly after itself.
+        once = [x for place, x in enumerate(executed) if place == 0 or x != executed[place - 1]]
+        assert once == [200 + step / 64 for step in range(1000)]
+        assert sim.arm.counters.overflowed == 0
+
+
+@virtual
+async def test_a_lost_acknowledgement_costs_less_than_three_reply_timeouts(lines: list[BadLine]) -> None:
+    async with simulate(speed=20) as sim, Magician.connect(sim.url) as arm:
+        await arm.move_to(210, 0, 40)
+        lines[0].reply = spoil_once(c.SET_PTP_CMD.id, [])
+        timeout, before = arm.link.reply_timeout, asyncio.get_running_loop().time()
+        motion = await arm.queue.move_to(220, 0, 40)
+        assert asyncio.get_running_loop().time() - before < 3 * timeout
+        await motion
+        assert targets(sim) == [210, 220]
+
+
+@virtual
+async def test_a_lost_request_is_sent_again(lines: list[BadLine]) -> None:
+    async with simulate(speed=20) as sim, Magician.connect(sim.url) as arm:
+        lines[0].request = spoil_once(c.SET_PTP_CMD.id, [])
+        await arm.move_to(220, 0, 40)
+        assert targets(sim) == [220]
+
+
+@virtual
+async def test_a_spoilt_request_is_sent_again_even_if_it_ends_nowhere(lines: list[BadLine]) -> None:
+    async with simulate(speed=20) as sim, Magician.connect(sim.url) as arm:
+        lines[0].request = spoil_once(c.SET_PTP_CMD.id, [(0, bytes.fromhex("AA AA FA 54 03 01"))])
+        await arm.move_to(220, 0, 40)
+        assert targets(sim) == [220]
+
+
+@pytest.mark.parametrize("late", [0.05, 0.3, 1.5, 2.5])
+@virtual
+async def test_a_late_reply_never_answers_a_later_call(lines: list[BadLine], late: float) -> None:
+    async with simulate(speed=20) as sim, Magician.connect(sim.url) as arm:
+        held: list[bytes] = []
+
+        def delay(data: bytes) -> list[tuple[float, bytes]]:
+            if not held and data[3] == c.GET_POSE.id:
+                held.append(data)
+                return [(late, data)]
+
+            return [(0, data)]
+
+        lines[0].reply = delay
+        first = await arm.get_pose()
+        assert held
+        sim.arm.guide_to(240, 20, 20)
+        started = asyncio.get_running_loop().time()
+        while asyncio.get_running_loop().time() < started + late + 0.2:
+            pose = await arm.get_pose()
+            assert math.dist((pose.x, pose.y), (240, 20)) < 0.01
+            await asyncio.sleep(0.001)
+
+        assert first.x != pytest.approx(240, abs=1)
+
+
+@virtual
+async def test_replies_after_a_pause_of_the_arm_answer_nobody_else(lines: list[BadLine]) -> None:
+    async with simulate(speed=20) as sim, Magician.connect(sim.url) as arm:
+        loop = asyncio.get_running_loop()
+        until = loop.time() + 1.0
+        lines[0].reply = lambda data: [(max(0.0, until - loop.time()), data)]
+        before = await arm.get_pose()
+        sim.arm.guide_to(240, 20, 20)
+        for _ in range(50):
+            assert (await arm.get_pose()).x == pytest.approx(240, abs=0.01)
+
+        assert before.x != pytest.approx(240, abs=1)
+
+
+def doubled(lines: list[BadLine]) -> None:
+    """The network delivers the next PTP command twice."""
+    line = lines[0]
+    line.disorder = 0.005
+
+    def twice(data: bytes) -> list[tuple[float, bytes]]:
+        if data[3] == c.SET_PTP_CMD.id:
+            line.request = lambda data: [(0, data)]
+            return [(0, data), (0, data)]
+
+        return [(0, data)]
+
+    line.request = twice
+
+
+@virtual
+async def test_a_doubled_absolute_move_is_a_warning(lines: list[BadLine]) -> None:
+    async with simulate(speed=20) as sim, Magician.connect(sim.url) as arm:
+        events = aiter(arm.link.events)
+        await arm.move_to(210, 0, 40)
+        doubled(lines)
+        await arm.move_to(220, 0, 40)
+        await arm.move_to(230, 0, 40)
+        assert targets(sim) == [210, 220, 220, 230]
+        while not isinstance(event := await anext(events), Surplus):
+            pass
+
+        assert event.count == 1
+
+
+@virtual
+async def test_a_doubled_relative_move_stops_the_arm(lines: list[BadLine]) -> None:
+    async with simulate(speed=20) as sim, Magician.connect(sim.url) as arm:
+        await arm.move_to(210, 0, 40)
+        doubled(lines)
+        with pytest.raises(MotionUnknown, match="SetPTPCmd must not run twice"):
+            for _ in range(5):
+                await arm.move_by(z=5, mode=PTPMode.MOVL_INC)
+
+        assert len(targets(sim)) <= 3
+        await arm.move_to(200, 0, 40)
+
+
+@virtual
+async def test_a_vanished_arm_ends_everything_in_time(lines: list[BadLine]) -> None:
+    async with simulate() as sim, Magician.connect(sim.url, on_error="leave") as arm:
+        motion = await arm.queue.move_to(220, 0, 40)
+        lines[0].request = lambda _: []
+        loop = asyncio.get_running_loop()
+        before = loop.time()
+        with pytest.raises(ReplyTimeout):
+            await arm.get_pose()
+
+        assert loop.time() - before == pytest.approx(1.5, abs=0.01)
+        with pytest.raises(ConnectionError, match="no longer answers"):
+            await motion
+
+        assert loop.time() - before < 8
+        with pytest.raises((MotionUnknown, ReplyTimeout, ConnectionError)):
+            await arm.queue.move_to(200, 0, 40)
+
+        assert loop.time() - before < 30
+
+
+@pytest.mark.parametrize("spoilt", ["request", "reply"])
+@virtual
+async def test_a_burst_that_is_not_acknowledged_whole_is_settled_or_unknown(lines: list[BadLine], spoilt: str) -> None:
+    """With its first command lost, the acknowledgements of the others would pass for those before them."""
+    async with simulate(speed=20) as sim, Magician.connect(sim.url, window=4) as arm:
+        lines[0].window = 4
+        setattr(lines[0], spoilt, spoil_once(c.SET_PTP_CMD.id, []))
+        try:
+            async with arm.queue.batch() as batch:
+                motions = [batch.move_to(200 + step, 0, 40) for step in range(4)]
+
+            await arm.queue.join()
+        except MotionUnknown:
+            for motion in motions:
+                with pytest.raises(MotionUnknown):
+                    await motion
+        else:
+            assert targets(sim) == [200, 201, 202, 203]
+
+
+@virtual
+async def test_an_arm_that_stops_answering_while_it_is_greeted_fails_in_time(lines: list[BadLine]) -> None:
+    async with simulate() as sim:
+        first = [True]
+
+        def answer_once(data: bytes) -> list[tuple[float, bytes]]:
+            return [(0, data)] if first and first.pop() else []
+
+        loop = asyncio.get_running_loop()
+        before = loop.time()
+        connecting = Magician.connect(sim.url, timeout=0.5)
+        opening = asyncio.create_task(connecting.__aenter__())
+        await asyncio.sleep(0)
+        lines[0].reply = answer_once
+        with pytest.raises(ConnectFailed):
+            await opening
+
+        assert loop.time() - before == pytest.approx(0.5, abs=0.05)
