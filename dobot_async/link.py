@@ -37,6 +37,7 @@ R = TypeVar("R")
 Q = TypeVar("Q")
 IMMEDIATE_RANK, QUEUED_RANK = 0, 1
 CLOSE_TIMEOUT = 2.0
+LEAST_PATIENCE = 0.001  # seconds; nobody answers a request for which less is left
 FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0
 BROKEN = (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceError, OSError)
 MUTE = 3
@@ -333,7 +334,7 @@ class Link(Generic[F]):
         deadline = self._loop.time() + timeout
         attempts = 0
         with self._pending.expect(frame.key, accept, repeatable=repeatable) as waiter:
-            while (left := deadline - self._loop.time()) > 0:
+            while (left := deadline - self._loop.time()) > LEAST_PATIENCE:
                 if not await self._opened_within(left):
                     break
 
