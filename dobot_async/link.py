@@ -13,26 +13,28 @@ later call fails with it at once. Nothing is held open across the caller's code:
 from __future__ import annotations
 
 import asyncio
-import enum
+import math
 import random
-from collections.abc import Awaitable, Callable, Hashable
+from collections.abc import Awaitable, Callable, Hashable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, Generic, Protocol, TypeVar, cast
+from typing import Any, Generic, TypeVar
 
 import anyio
 
+from dobot_async.contract import Encoder, Frame, LinkState, LinkStats, Parser, Unexpected
 from dobot_async.errors import ConnectFailed, ConnectionLost, ProtocolError, ReplyTimeout
 from dobot_async.events import Events, Watched
-from dobot_async.pending import SWALLOWED, Keyed, Pending, Waiter
+from dobot_async.pending import SWALLOWED, Pending, Waiter
+from dobot_async.posted import Posted, deliver
 from dobot_async.roundtrip import RoundTrip
-from dobot_async.transports import Transport
+from dobot_async.transports import Transport, hidden
 from dobot_async.turns import Turns
 from dobot_async.wire import Command
 
-__all__ = ["Link", "LinkState", "LinkStats", "Posted", "Unexpected"]
+__all__ = ["Link"]
 
+F = TypeVar("F", bound=Frame)
 R = TypeVar("R")
 Q = TypeVar("Q")
 IMMEDIATE_RANK, QUEUED_RANK = 0, 1
@@ -43,84 +45,7 @@ BROKEN = (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceErro
 MUTE = 3
 """Unanswered requests in a row after which the arm may be waiting for the rest of a frame with a spoilt length: it gets
 so many bytes that mean nothing that any frame ends."""
-
-
-class Frame(Keyed, Protocol):
-    """What a family's parser makes and its transport carries."""
-
-    @property
-    def params(self) -> bytes:
-        """The parameters, for the command's layout."""
-
-    def __bytes__(self) -> bytes: ...
-
-
-F = TypeVar("F", bound=Frame)
-F_co = TypeVar("F_co", bound=Frame, covariant=True)
-
-
-class Parser(Protocol[F]):
-    """Finds a family's frames in a stream that may be cut anywhere and may hold anything."""
-
-    junk_bytes: int
-    bad_frames: int
-
-    def feed(self, data: bytes) -> list[F]:
-        """Takes the next bytes of the stream, returns the frames that they complete."""
-
-    def resync(self) -> list[F]:
-        """Gives up an incomplete frame, returns the frames found inside of it."""
-
-    def reset(self) -> None:
-        """Forgets an incomplete frame: another stream begins."""
-
-
-class Encoder(Protocol[F_co]):
-    """Makes a family's request frame of a command's row and its parameters."""
-
-    def __call__(self, command: Command[Any, Any], params: bytes, *, queued: bool) -> F_co: ...
-
-
-class LinkState(enum.Enum):
-    """What a link is good for."""
-
-    OPEN = "open"
-    REOPENING = "reopening"
-    LOST = "lost"
-    CLOSED = "closed"
-
-
 DEAD = {LinkState.LOST, LinkState.CLOSED}
-
-
-@dataclass(frozen=True, slots=True)
-class Unexpected(Generic[F]):
-    """A frame that nobody waited for: late beyond its tombstone, of another client, or of no request at all."""
-
-    frame: F
-
-
-@dataclass(slots=True)
-class LinkStats:
-    """What went over a link so far.
-
-    Attributes:
-        sent: Requests, repeated ones included.
-        received: Whole frames with a good checksum.
-        repeated: Requests that were sent again because no answer came.
-        timeouts: Calls that failed because no answer came.
-        unexpected: Frames that nobody waited for.
-        junk_bytes: Bytes that belong to no frame.
-        bad_frames: Frames with a wrong checksum.
-    """
-
-    sent: int = 0
-    received: int = 0
-    repeated: int = 0
-    timeouts: int = 0
-    unexpected: int = 0
-    junk_bytes: int = 0
-    bad_frames: int = 0
 
 
 class Link(Generic[F]):
@@ -129,6 +54,7 @@ class Link(Generic[F]):
     Attributes:
         state: Its `value` says whether it is open, is being reopened, was lost or closed; `async for` yields changes.
         outages: How often it was lost and reopened.
+        heard_at: When the last frame came, in the loop's seconds.
         events: What happened unasked: frames that nobody waited for, as `Unexpected`, and what the family adds.
         trace: Called with (outgoing, frame) for each frame, if set.
         stray: Called with each frame that nobody waited for, if set.
@@ -142,13 +68,15 @@ class Link(Generic[F]):
         *,
         url: str,
         filler: bytes = b"",
+        fences: Sequence[Command[None, Any]] = (),
         read_only: bool = False,
         round_trip: RoundTrip | None = None,
         reopen: Callable[[], Awaitable[Transport]] | None = None,
     ) -> None:
-        self.url = url
+        self.url = hidden(url)
         self.state = Watched(LinkState.OPEN)
         self.outages = 0
+        self.heard_at = -math.inf
         self.events: Events[object] = Events()
         self.trace: Callable[[bool, F], None] | None = None
         self.stray: Callable[[F], None] | None = None
@@ -157,14 +85,14 @@ class Link(Generic[F]):
         self._parser = parser
         self._encode = encode
         self._filler = filler
+        self._fences = fences
         self._unanswered = 0
         self._read_only = read_only
         self._stats = LinkStats()
         self._loop = asyncio.get_running_loop()
-        self._pending: Pending[F] = Pending(self._loop.time)
+        self._pending: Pending[F] = Pending(self._loop.time, disorder=lambda: self.disorder)
         self._turns = Turns(transport.in_flight)
         self._round_trip = round_trip or RoundTrip()
-        self._heard: dict[Hashable, float] = {}
         self._sending = anyio.Lock(fast_acquire=True)
         self._cause: BaseException | None = None
         self._reader = self._loop.create_task(self._read(), name=f"dobot_async reader {url}")
@@ -194,7 +122,13 @@ class Link(Generic[F]):
         return self._encode(command, command.request.encode(value), queued=queued)
 
     async def request(
-        self, command: Command[Q, R], value: Q, *, timeout: float | None = None, urgent: bool = False
+        self,
+        command: Command[Q, R],
+        value: Q,
+        *,
+        timeout: float | None = None,
+        urgent: bool = False,
+        lenient: bool = False,
     ) -> R:
         """Sends one immediate command and returns the arm's answer.
 
@@ -203,6 +137,8 @@ class Link(Generic[F]):
             value: Its parameters, None where it has none.
             timeout: Seconds until ReplyTimeout, repeated requests included; the row's own by default.
             urgent: Goes ahead of everything else.
+            lenient: On a datagram link, an answer that was later than its disorder may answer this: it costs less to
+                ask where much is lost.
 
         Raises:
             ValueError: The parameters do not fit, or the connection only reads.
@@ -221,20 +157,66 @@ class Link(Generic[F]):
 
             return decoded
 
+        return await self.forward(
+            frame,
+            accept,
+            name=command.name,
+            timeout=timeout,
+            echo=value if echo else None,
+            repeatable=command.repeatable,
+            urgent=urgent,
+            lenient=lenient,
+        )
+
+    async def forward(
+        self,
+        frame: F,
+        accept: Callable[[F], R],
+        *,
+        name: str,
+        timeout: float,
+        echo: Hashable = None,
+        repeatable: bool = False,
+        urgent: bool = False,
+        lenient: bool = False,
+        ready: Callable[[], None] = lambda: None,
+    ) -> R:
+        """Sends a frame, one of a key at a time, and returns what `accept` makes of the answer.
+
+        Args:
+            frame: Sent as it is; once, unless `repeatable`.
+            accept: Raises ProtocolError if a frame of this key is not the answer.
+            name: The command's name, for messages.
+            timeout: Seconds until ReplyTimeout.
+            echo: What of the request `accept` finds in its answer.
+            repeatable: It may be sent again while no answer comes.
+            urgent: It goes ahead of everything else.
+            lenient: See `request`.
+            ready: Called when it is about to be sent for the first time; what this raises is raised, and nothing sent.
+        """
         self._check()
         if not urgent:
-            await self._turn(frame.key, IMMEDIATE_RANK, timeout, command.name)
+            await self._turn(frame.key, IMMEDIATE_RANK, timeout, name)
 
+        lenient = lenient and self.disorder > 0
+        waiter = self._pending.expect(frame.key, accept, echo=echo, repeatable=repeatable, lenient=lenient)
         try:
-            if not urgent:
-                await self.calm(frame.key)
-
-            return await self._exchange(frame, accept, command.name, timeout, repeatable=command.repeatable)
+            answer: R = await self._exchange(frame, waiter, name, timeout, urgent=urgent, ready=ready)
+            return answer
         finally:
             if not urgent:
                 self._turns.give(frame.key)
 
-    async def post(self, frame: F, accept: Callable[[F], R], *, name: str, timeout: float) -> Posted[R]:
+    async def post(
+        self,
+        frame: F,
+        accept: Callable[[F], R],
+        *,
+        name: str,
+        timeout: float,
+        tombstone: bool = False,
+        leaving: Callable[[], None] = lambda: None,
+    ) -> Posted[R]:
         """Sends the frame of a queued command; its answer is awaited with the `Posted` that is returned.
 
         Several may be under way. `accept` knows a late answer by its index, so none needs a tombstone.
@@ -244,10 +226,13 @@ class Link(Generic[F]):
             accept: Returns the answer's value, or raises ProtocolError if a frame of this key is not the answer.
             name: The command's name, for messages.
             timeout: Seconds that the link may be too busy.
+            tombstone: Swallow an answer that comes after nobody waits for it any more, for a family without indices.
+            leaving: Called when it goes out: from now on the arm may have it.
         """
         self._check()
         await self._turn(None, QUEUED_RANK, timeout, name)
-        waiter = self._pending.expect(frame.key, accept, tombstone=False)
+        leaving()
+        waiter = self._pending.expect(frame.key, accept, tombstone=tombstone)
         posted: Posted[R] = Posted(self, name, waiter, self._round_trip, partial(self._turns.give, None))
         try:
             waiter.sent()
@@ -267,15 +252,6 @@ class Link(Generic[F]):
         """Takes note that a request went unanswered for the reply timeout."""
         self._round_trip.unanswered()
         self._unanswered = min(self._unanswered + 1, MUTE)
-
-    async def calm(self, key: Hashable) -> None:
-        """Returns when no second answer to a request of this key can arrive: it would pass for the next one's.
-
-        Either the request or its answer may have been doubled on the way, so it takes the disorder of both ways.
-        """
-        heard = self._heard.get(key)
-        if heard is not None and self.disorder:
-            await asyncio.sleep(heard + 2 * self.disorder - self._loop.time())
 
     async def opened(self) -> None:
         """Returns when the link is open: at once, or when it has been reopened; raises ConnectionLost if it is dead."""
@@ -329,35 +305,92 @@ class Link(Generic[F]):
         self._pending.fail(self._lost())
         self.events.close()
 
-    async def _exchange(self, frame: F, accept: Callable[[F], R], name: str, timeout: float, *, repeatable: bool) -> R:
-        """Sends a frame, again and again if that is harmless, and returns what `accept` makes of its answer."""
+    async def _exchange(
+        self, frame: F, waiter: Waiter[F], name: str, timeout: float, *, urgent: bool, ready: Callable[[], None]
+    ) -> Any:
+        """Sends a frame, again and again if that is harmless, and returns what its waiter makes of the answer."""
         deadline = self._loop.time() + timeout
-        attempts = 0
-        with self._pending.expect(frame.key, accept, repeatable=repeatable) as waiter:
+        overdue = False
+        with waiter:
             while (left := deadline - self._loop.time()) > LEAST_PATIENCE:
-                if not await self._opened_within(left):
+                if not await self._ready(waiter, left, urgent=urgent):
                     break
 
-                reply = self._listen(waiter, resync=attempts > 0)
-                attempts += 1
-                patience = min(left, self._round_trip.timeout) if repeatable else left
-                if not await self._ask(frame, waiter, reply, patience) or reply.result() is SWALLOWED:
-                    continue
+                if not waiter.sends:
+                    ready()
 
-                if attempts == 1:
-                    self._round_trip.sample(self._loop.time() - waiter.sends[0])
-
-                return cast(R, self.answer(reply))
+                reply = self._listen(waiter, resync=bool(waiter.sends))
+                patience = min(left, self._round_trip.timeout) if waiter.repeatable else left
+                if not await self._ask(frame, waiter, reply, patience):
+                    overdue = True
+                elif reply.result() is not SWALLOWED:
+                    self._measure(waiter.sends, overdue=overdue)
+                    return self.answer(reply)
 
             reply = self._listen(waiter, resync=True)
             if reply.done() and reply.result() is not SWALLOWED:
-                return cast(R, self.answer(reply))
+                return self.answer(reply)
 
         if waiter.misfit:
             raise ProtocolError(f"{name}: the arm's answer does not fit: {waiter.misfit}")
 
         self._stats.timeouts += 1
         raise self._overdue(name, timeout)
+
+    def _measure(self, sends: list[float], *, overdue: bool) -> None:
+        """Learns from a call that is answered now how long answers take."""
+        now = self._loop.time()
+        if len(sends) == 1:
+            self._round_trip.sample(now - sends[0])
+        else:
+            self._round_trip.probably(now - sends[-2] if overdue else 0.0)
+
+    async def _ready(self, waiter: Waiter[F], seconds: float, *, urgent: bool) -> bool:
+        """Returns when a request may be sent, so that its answer is known from others; False if that is too late."""
+        key, urgent = waiter.key, urgent and not waiter.sends
+        owed = None if urgent else self._pending.owed(key, but=waiter)
+        if self.state.value is LinkState.OPEN and (urgent or (owed is None and not self.disorder)):
+            return True
+
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await self.opened()
+                if owed is not None:
+                    await self._fence(key, owed)
+
+                if not urgent:
+                    await self._calm(key)
+
+                return True
+
+        return False
+
+    async def _fence(self, key: Hashable, owed: float) -> None:
+        """Asks something else if answers of this key are owed: what is not there when that is answered was lost."""
+        frame = self._other(key)
+        if frame is None:
+            return
+
+        await self._calm(frame.key)
+        if self.disorder:
+            await asyncio.sleep(owed + self.disorder - self._loop.time())
+
+        answered: asyncio.Future[Any] = self._loop.create_future()
+        with self._pending.expect(frame.key, lambda _: None) as waiter, suppress(TimeoutError):
+            waiter.listen(partial(deliver, answered))
+            self._stats.sent += 1
+            waiter.sent()
+            await self._send(frame)
+            if self.disorder:  # on a stream nothing overtakes it
+                async with asyncio.timeout(self._round_trip.timeout):
+                    await answered
+
+        await asyncio.sleep(self.disorder)
+
+    async def _calm(self, key: Hashable) -> None:
+        """Returns when no second answer to a request of this key can arrive: it would pass for the next one's."""
+        if self.disorder:
+            await asyncio.sleep(self._pending.calm_at(key) - self._loop.time())
 
     def _listen(self, waiter: Waiter[F], *, resync: bool) -> asyncio.Future[Any]:
         """Returns where the next answer arrives; it may do so at once, out of what an incomplete frame held back."""
@@ -377,26 +410,41 @@ class Link(Generic[F]):
                     self._stats.repeated += bool(waiter.sends)
                     waiter.sent()
                     await self._send(frame)
+                    await self._prove(waiter, reply)
 
                 await reply
 
+        waiter.give_up()
         if reply.done() and not reply.cancelled():
             return True
 
         self.overdue()
         return False
 
-    async def _opened_within(self, seconds: float) -> bool:
-        """Whether the link is open, or is so before the seconds have passed."""
-        if self.state.value is LinkState.OPEN:
-            return True
+    async def _prove(self, waiter: Waiter[F], reply: asyncio.Future[Any]) -> None:
+        """Where an answer may be late alone, asks something else behind the question, and waits for both answers.
 
-        with suppress(TimeoutError):
-            async with asyncio.timeout(seconds):
-                await self.opened()
-                return True
+        If there is one answer to the question by then, it is the right one: replies come in order.
+        """
+        if self.disorder or waiter.lenient or not self._pending.haunted(waiter):
+            return
 
-        return False
+        frame = self._other(waiter.key)
+        if frame is None:
+            return
+
+        waiter.hold()
+        with self._pending.expect(frame.key, lambda _: None) as witness:
+            witness.listen(waiter.prove)
+            self._stats.sent += 1
+            witness.sent()
+            await self._send(frame)
+            await reply
+
+    def _other(self, key: Hashable) -> F | None:
+        """A question of another key to which no answer is awaited."""
+        frames = (self.frame(command, None) for command in self._fences)
+        return next((frame for frame in frames if frame.key != key and not self._pending.line(frame.key)), None)
 
     async def _turn(self, key: Hashable, rank: int, timeout: float, what: str) -> None:
         """Waits for the turn of a request, no longer than its own timeout."""
@@ -468,11 +516,10 @@ class Link(Generic[F]):
         """Hands frames to those who wait for them."""
         if frames:
             self._unanswered = 0
+            self.heard_at = self._loop.time()
 
-        now = self._loop.time()
         for frame in frames:
             self._stats.received += 1
-            self._heard[frame.key] = now
             if self.trace:
                 self.trace(False, frame)
 
@@ -482,61 +529,3 @@ class Link(Generic[F]):
                     self.stray(frame)
 
                 self.events.publish(Unexpected(frame))
-
-
-class Posted(Generic[R]):
-    """A queued command that was sent and is not answered yet."""
-
-    def __init__(
-        self,
-        link: Link[Any],
-        name: str,
-        waiter: Waiter[Any],
-        round_trip: RoundTrip,
-        give_turn: Callable[[], None],
-    ) -> None:
-        self._link = link
-        self._round_trip = round_trip
-        self._name = name
-        self._waiter = waiter.__enter__()
-        self._give_turn: Callable[[], None] | None = give_turn
-        self._reply: asyncio.Future[R] = asyncio.get_running_loop().create_future()
-        waiter.listen(partial(deliver, self._reply))
-
-    async def answer(self) -> R:
-        """Returns what `accept` made of the answer.
-
-        Raises:
-            ReplyTimeout: No answer came within the link's own timeout.
-            ConnectionLost: The link is gone.
-        """
-        try:
-            async with asyncio.timeout(self._round_trip.timeout):
-                await self._reply
-        except TimeoutError:
-            if not self._reply.done() or self._reply.cancelled():
-                self._link.overdue()
-                raise ReplyTimeout(f"{self._name} was not acknowledged") from None
-        finally:
-            self.forget()
-
-        self._round_trip.sample(asyncio.get_running_loop().time() - self.sent_at)
-        return self._link.answer(self._reply)
-
-    @property
-    def sent_at(self) -> float:
-        """When it was sent, in the loop's seconds."""
-        return self._waiter.sends[0]
-
-    def forget(self) -> None:
-        """Stops waiting; may be called again."""
-        give_turn, self._give_turn = self._give_turn, None
-        if give_turn:
-            self._waiter.__exit__()
-            give_turn()
-
-
-def deliver(reply: asyncio.Future[Any], value: Any) -> None:
-    """Sets a future that its waiter may have given up already."""
-    if not reply.done():
-        reply.set_result(value)

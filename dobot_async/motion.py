@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Coroutine, Generator, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Collection, Coroutine, Generator, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any, TypeVar
 
@@ -196,8 +196,10 @@ class MotionQueue:
 
     async def update(self) -> None:
         """Asks the arm once how far it is, and ends the Motions that this decides."""
-        if self._pending:
+        try:
             await self._observe(alarms=True)
+        except MotionUnknown as error:
+            await self._give_up(error)
 
     async def pause(self) -> None:
         """Lets the arm finish the command that it executes, and then wait; Motions stay pending."""
@@ -218,15 +220,15 @@ class MotionQueue:
     def fail(self, error: DobotError) -> None:
         """Ends all Motions, and the puts that wait for room, with an error."""
         self._refuse(error)
-        self._end_all(error)
+        self._end_all(error, self._executor.under_way)
 
-    def _end_all(self, error: DobotError) -> None:
+    def _end_all(self, error: DobotError, under_way: Collection[Entry]) -> None:
         """Ends all Motions that are pending or under way."""
         pending, self._pending = self._pending, deque()
         for motion in pending:
             motion.end(error)
 
-        for entry in self._executor.under_way:
+        for entry in under_way:
             if entry in self._entering:
                 self._entering.pop(entry).end(error)
 
@@ -307,8 +309,9 @@ class MotionQueue:
 
             self.fail(error)
             async with self._order:
+                under_way = list(self._executor.under_way)
                 await self._executor.reset()
-                self._end_all(error)  # what was under way; who puts from now on waits for this lock, and goes on
+                self._end_all(error, under_way)  # who puts from now on waits for this lock, and goes on
                 self._left = 0
         except DobotError as failure:
             self.fail(failure)
@@ -389,10 +392,14 @@ class MotionQueue:
         text = "; ".join(map(str, faults))
         error = ArmAlarm(f"the arm raised alarms: {text}", faults)
         self._refuse(error)
-        await self._executor.halt()
-        for motion in [motion for motion in reached if motion.moves][:-1]:
-            if await self._executor.stands_at(motion.entry):
-                motion.end()
+        self._stopping += 1
+        try:
+            await self._executor.halt()
+            for motion in [motion for motion in reached if motion.moves][:-1]:
+                if await self._executor.stands_at(motion.entry):
+                    motion.end()
+        finally:
+            self._stopping -= 1
 
         await self._stop(error, halt=False)
 

@@ -1,7 +1,7 @@
 """Who waits for which reply. Sans-I/O: the clock is passed in, and nothing here waits.
 
 The protocols have no sequence numbers, so a reply is matched by its key (the command's ID), by its layout, and by its
-place in line: replies of one key come in the order of their requests.
+place in line: replies come in the order of their requests.
 
     expect --> WAITING --reply--> answered ------------.
                   |                                    |  requests sent more often than answered
@@ -9,20 +9,23 @@ place in line: replies of one key come in the order of their requests.
 
 A tombstone stands in line for the replies that requests are still owed, and swallows them. Without it a late reply
 would answer the next request of its key with wrong data; with it, at the worst, a good reply is swallowed in the place
-of a lost one and its request is sent again, at once. What is owed is forgotten
+of a lost one and its request is sent again, at once. What is owed ends
 
-- `linger` seconds after its request, if the call was never answered;
-- twice as long after its request as the peer was last silent, if the call was answered by another one of its requests;
-  but the last one owed in each line stands for `linger` seconds.
+- when a request that was sent later, of whatever key, is answered: replies come in order, so this one was lost. But of
+  each line one reply may yet be a straggler, that came to be late alone: it is recognised for `linger` seconds;
+- `linger` seconds after its request; a peer that has just shown that it pauses for longer is given twice as long.
 
-So a single reply may be late by up to `linger` seconds, and any number may be late together, as when the peer pauses,
-and still none answers a later request. A link that loses much costs each call some requests more, not ever more.
+So any number of replies may be late together, as when the peer pauses, and one of each key alone, and still none
+answers a later request. On a link with `disorder` "later" means later by that much, and a reply so close behind another
+of its key that it may be a second copy answers nobody.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from itertools import count
 from typing import Any, Generic, Protocol, Self, TypeVar
 
 from dobot_async.errors import ProtocolError
@@ -30,7 +33,6 @@ from dobot_async.errors import ProtocolError
 __all__ = ["LINGER", "SWALLOWED", "Keyed", "Pending", "Waiter"]
 
 LINGER = 3.0
-LEAST_SILENCE = 0.05
 SWALLOWED = object()
 """Delivered instead of a reply when a tombstone has swallowed what may have been it."""
 
@@ -46,65 +48,100 @@ class Keyed(Protocol):
 F = TypeVar("F", bound=Keyed)
 
 
+@dataclass(slots=True, eq=False)
+class Sent(Generic[F]):
+    """A request that went out, and the reply that it is owed.
+
+    Attributes:
+        waiter: Whose it is, or was.
+        number: Of all that went out.
+        at: When it did.
+        until: Until when its reply may come in its turn.
+        straggles: Until when it may come alone, behind those of later requests.
+        passed: From when on it can come in no other way.
+        succeeds: Whether a straggler may come in its place: which of two that could come first has come is not known.
+    """
+
+    waiter: Waiter[F]
+    number: int
+    at: float
+    until: float
+    straggles: float
+    passed: float = math.inf
+    succeeds: bool = False
+
+
 class Pending(Generic[F]):
     """Everybody who waits for a reply on one link.
 
     Args:
         clock: Returns seconds.
         linger: Seconds for which a reply may be late and is still recognised.
+        disorder: Returns the seconds within which messages may overtake one another, and a doubled one arrive again.
     """
 
-    def __init__(self, clock: Callable[[], float], linger: float = LINGER) -> None:
+    def __init__(
+        self, clock: Callable[[], float], linger: float = LINGER, disorder: Callable[[], float] = lambda: 0.0
+    ) -> None:
         self.clock = clock
         self.linger = linger
-        self._silence = LEAST_SILENCE
-        self._silence_ended = -math.inf
-        self._silent_since: float | None = None
-        self._lines: dict[Hashable, list[Waiter[F]]] = {}
+        self._disorder = disorder
+        self._numbers = count()
+        self._heard: dict[Hashable, float] = {}
+        self._lines: dict[Hashable, list[Sent[F]]] = {}
 
     def expect(
-        self, key: Hashable, accept: Callable[[F], Any], *, repeatable: bool = False, tombstone: bool = True
+        self,
+        key: Hashable,
+        accept: Callable[[F], Any],
+        *,
+        echo: Hashable = None,
+        repeatable: bool = False,
+        lenient: bool = False,
+        tombstone: bool = True,
     ) -> Waiter[F]:
         """Returns a waiter, to be entered as a context manager before its request is sent.
 
         Args:
             key: The key of the reply.
             accept: Returns the reply's value, or raises ProtocolError if the frame cannot be the reply.
+            echo: What `accept` looks for in the reply, by which it tells it from those to other requests of its key.
             repeatable: Its request may be sent again: it wants to hear when a tombstone has swallowed a reply.
-            tombstone: False where `accept` can tell a late reply from the right one by its content.
+            lenient: It may be answered by a straggler: nothing is swallowed for fear of one.
+            tombstone: False where `accept` can tell a late or doubled reply from the right one by its content.
         """
-        return Waiter(self, key, accept, repeatable=repeatable, tombstone=tombstone)
+        return Waiter(self, key, accept, echo=echo, repeatable=repeatable, lenient=lenient, tombstone=tombstone)
 
     def resolve(self, frame: F) -> bool:
         """Gives a frame to the first in its line whom it fits; False if nobody waits for it."""
-        self._hear()
-        line = self._line(frame.key)
-        for place, waiter in enumerate(line):
-            if not waiter.owed:
-                continue
+        now = self.clock()
+        doubled = now < self.calm_at(frame.key)
+        line = self.line(frame.key)
+        found = self._find(line, frame, now, doubled=doubled)
+        if found or not doubled:
+            self._heard[frame.key] = now
 
-            try:
-                value = waiter.accept(frame)
-            except ProtocolError as error:
-                waiter.misfit = error
-                continue
-
-            if waiter.deliver:
-                self._answer(waiter, value)
-            else:
-                waiter.owed.pop(0)
-                for later in line[place + 1 :]:
-                    later.nudge()
-
-            if not waiter.owed:
-                line.remove(waiter)
-
-            break
-        else:
+        if found is None:
             return False
 
-        if not any(waiter.deliver for others in self._lines.values() for waiter in others):
-            self._silent_since = None
+        place, value = found
+        sent, waiter = line[place], line[place].waiter
+        if waiter.held is not None:
+            waiter.held.append(value)
+            return True
+
+        self._take(line, place)
+        if waiter.tombstone:
+            self._pass(sent)
+
+        if waiter.deliver:
+            waiter.answer(value)
+        else:
+            for other in {later.waiter for later in line[place:]}:
+                other.nudge()
+
+        if not line:
+            self._lines.pop(frame.key, None)
 
         return True
 
@@ -112,70 +149,130 @@ class Pending(Generic[F]):
         """Delivers an error to everybody who still waits, and forgets all lines."""
         lines, self._lines = self._lines, {}
         for line in lines.values():
-            for waiter in line:
-                waiter.answer(error)
+            for sent in line:
+                sent.waiter.answer(error)
 
-    def __len__(self) -> int:
-        """How many wait, tombstones included."""
-        return sum(len(self._line(key)) for key in list(self._lines))
+    def owed(self, key: Hashable, *, but: Waiter[F] | None = None) -> float | None:
+        """When the last request of a key, but for one call's, was sent whose reply may still come in its turn."""
+        now = self.clock()
+        return max((sent.at for sent in self.line(key) if sent.passed > now and sent.waiter is not but), default=None)
 
-    def enter(self, waiter: Waiter[F]) -> None:
-        """Puts a waiter at the end of its line, unless it still stands there."""
-        line = self._lines.setdefault(waiter.key, [])
-        if waiter not in line:
-            line.append(waiter)
+    def haunted(self, waiter: Waiter[F]) -> bool:
+        """Whether a straggler may come that would pass for the reply to a call."""
+        return any(sent.waiter is not waiter or sent.succeeds for sent in self.line(waiter.key))
 
-    def leave(self, waiter: Waiter[F]) -> None:
-        """Takes a waiter out of its line, or leaves it there as a tombstone while replies are owed to it."""
-        waiter.deliver = None
-        line = self._line(waiter.key)
-        if not waiter.tombstone and waiter in line:
-            line.remove(waiter)
+    def line(self, key: Hashable) -> list[Sent[F]]:
+        """The line of a key, after what is no longer owed was taken out of it."""
+        line = self._lines.get(key)
+        if line is None:
+            return []
+
+        if any(not sent.waiter.deliver for sent in line):
+            now = self.clock()
+            stragglers: dict[Hashable, Sent[F]] = {}
+            for sent in line:
+                if sent.passed <= now and not sent.waiter.deliver:
+                    stragglers[sent.waiter.echo] = sent  # the latest, for each is awaited for as long
+
+            line[:] = [sent for sent in line if sent.waiter.deliver or self._stands(sent, now, stragglers)]
 
         if not line:
-            self._lines.pop(waiter.key, None)
-
-    def asked(self) -> None:
-        """Notes that a request goes out now: from here on the peer is silent."""
-        if self._silent_since is None:
-            self._silent_since = self.clock()
-
-    def _hear(self) -> None:
-        """Measures the silence that a frame ends. It stands for the burst of frames that it has held back as well."""
-        now = self.clock()
-        silence = 0.0 if self._silent_since is None else now - self._silent_since
-        if silence > LEAST_SILENCE:
-            self._silence, self._silence_ended = silence, now
-        elif now > self._silence_ended + self._silence:
-            self._silence = LEAST_SILENCE
-
-        self._silent_since = now
-
-    def _answer(self, waiter: Waiter[F], value: Any) -> None:
-        """Delivers a reply, and settles how long the others are awaited that its requests are owed."""
-        waiter.owed.pop(0)
-        if waiter.owed:
-            for other in self._lines[waiter.key]:
-                if other is not waiter and other.owed:
-                    other.owed[-1] = min(other.owed[-1], other.soon)
-
-            late, at_least = min(2 * self._silence, self.linger), self.clock() + 2 * LEAST_SILENCE
-            soon = [max(sent + late, at_least) for sent in waiter.sends[-len(waiter.owed) :]]
-            waiter.owed, waiter.soon = [*soon[:-1], max(soon[-1], waiter.owed[-1])], soon[-1]
-
-        waiter.answer(value)
-
-    def _line(self, key: Hashable) -> list[Waiter[F]]:
-        """The line of a key, after what is no longer owed was taken out of it."""
-        line = self._lines.get(key, [])
-        now = self.clock()
-        if any(waiter.owed and min(waiter.owed) <= now for waiter in line):
-            for waiter in line:
-                waiter.owed = [until for until in waiter.owed if waiter.deliver or until > now]
-
-            line[:] = [waiter for waiter in line if waiter.owed or waiter.deliver]
+            del self._lines[key]
 
         return line
+
+    def calm_at(self, key: Hashable) -> float:
+        """From when on no reply of a key can be the second copy of one that was heard.
+
+        Either the request or its reply may have been doubled on the way, so it takes the disorder of both ways.
+        """
+        return self._heard.get(key, -math.inf) + 2 * self._disorder()
+
+    def __len__(self) -> int:
+        """How many replies are awaited, those of tombstones included."""
+        return sum(len(self.line(key)) for key in list(self._lines))
+
+    def enter(self, waiter: Waiter[F]) -> None:
+        """A request goes out now; its reply is awaited behind those of its key that went out before."""
+        now = self.clock()
+        until = now + self.linger
+        sent = Sent(waiter, next(self._numbers), now, until, until)
+        self._lines.setdefault(waiter.key, []).append(sent)
+
+    def leave(self, waiter: Waiter[F]) -> None:
+        """Nobody waits any more; what is owed stays in line, if it needs to."""
+        waiter.deliver = None
+        line = self._lines.get(waiter.key)
+        if line is None:
+            return
+
+        if not waiter.tombstone:
+            line[:] = [sent for sent in line if sent.waiter is not waiter]
+
+        if not line:
+            del self._lines[waiter.key]
+
+    def _find(self, line: list[Sent[F]], frame: F, now: float, *, doubled: bool) -> tuple[int, Any] | None:
+        """Returns whose place in the line a frame fits, and what it means."""
+        excused = any(sent.waiter.deliver and (sent.waiter.lenient or sent.waiter.held is not None) for sent in line)
+        for place, sent in enumerate(line):
+            waiter = sent.waiter
+            if waiter.tombstone and (doubled or (excused and sent.passed <= now and not waiter.deliver)):
+                continue
+
+            try:
+                return place, waiter.accept(frame)
+            except ProtocolError as error:
+                waiter.misfit = error
+
+        return None
+
+    def proven(self, waiter: Waiter[F], held: list[Any]) -> None:
+        """What was asked behind a call's last request is answered: what has come is its reply, or a straggler."""
+        line = self.line(waiter.key)
+        place = max((place for place, sent in enumerate(line) if sent.waiter is waiter), default=None)
+        if len(held) == 1 and place is not None:
+            self._pass(line.pop(place))
+            waiter.answer(held[0])
+            return
+
+        self.unproven(waiter, held)
+        waiter.nudge()
+
+    def unproven(self, waiter: Waiter[F], held: list[Any]) -> None:
+        """Replies have come, and nothing tells to which requests: to those sent first, for all that is known."""
+        line = self.line(waiter.key)
+        for _ in held:
+            if line:
+                self._take(line, 0)
+
+    def _take(self, line: list[Sent[F]], place: int) -> None:
+        """Takes a reply's place out of its line.
+
+        If nothing but a straggler could come there, either it has come, or the reply was the next one's, and the
+        straggler may yet come, but no later than before.
+        """
+        taken = line.pop(place)
+        if place < len(line) and (taken.succeeds or taken.passed <= self.clock()):
+            heir = line[place]
+            heir.straggles, heir.succeeds = min(heir.straggles, taken.straggles), True
+
+    def _pass(self, answered: Sent[F]) -> None:
+        """What was sent before something that is answered now was answered, or lost; the rest may be as late."""
+        disorder, now = self._disorder(), self.clock()
+        passed, late = now + disorder, 2 * (now - answered.at) if answered.waiter.deliver else 0.0
+        for line in self._lines.values():
+            for sent in line:
+                sent.until = max(sent.until, min(sent.at + late, now + self.linger))
+                if sent.number < answered.number and sent.at <= answered.at - disorder:
+                    sent.passed = min(sent.passed, passed)
+
+    def _stands(self, sent: Sent[F], now: float, stragglers: dict[Hashable, Sent[F]]) -> bool:
+        """Whether a tombstone is still needed."""
+        if sent.passed <= now:
+            return sent is stragglers[sent.waiter.echo] and sent.straggles > now
+
+        return sent.until > now
 
 
 class Waiter(Generic[F]):
@@ -183,21 +280,21 @@ class Waiter(Generic[F]):
 
     Attributes:
         sends: When its requests were sent.
-        owed: For each reply that is still to come, until when it is awaited.
-        soon: Until when the last one of an answered call is awaited, once there is another in its line.
+        held: Replies that are kept back until it is proven that none of them is a straggler; None if that is not done.
         misfit: Why the last frame of this key could not be the reply, if one came.
     """
 
     __slots__ = (
         "accept",
         "deliver",
+        "echo",
+        "held",
         "key",
+        "lenient",
         "misfit",
-        "owed",
         "pending",
         "repeatable",
         "sends",
-        "soon",
         "tombstone",
     )
 
@@ -207,31 +304,47 @@ class Waiter(Generic[F]):
         key: Hashable,
         accept: Callable[[F], Any],
         *,
+        echo: Hashable,
         repeatable: bool,
+        lenient: bool,
         tombstone: bool,
     ) -> None:
+        self.echo = echo
         self.repeatable = repeatable
+        self.lenient = lenient
         self.pending = pending
         self.key = key
         self.accept = accept
         self.tombstone = tombstone
         self.deliver: Callable[[Any], None] | None = None
+        self.held: list[Any] | None = None
         self.misfit: ProtocolError | None = None
         self.sends: list[float] = []
-        self.owed: list[float] = []
-        self.soon = math.inf
 
     def listen(self, deliver: Callable[[Any], None]) -> None:
         """Says who is to hear of the reply; called once for each request that is sent, before `sent`."""
         self.deliver = deliver
-        self.pending.enter(self)  # a reply may have come and missed the one who listened before
 
     def sent(self) -> None:
         """Notes that the request goes out now, for the first time or again."""
-        now = self.pending.clock()
-        self.pending.asked()
-        self.sends.append(now)
-        self.owed.append(now + self.pending.linger)
+        self.sends.append(self.pending.clock())
+        self.pending.enter(self)
+
+    def hold(self) -> None:
+        """From now on replies are kept back, until `prove` or `give_up`."""
+        self.held = []
+
+    def prove(self, _: object = None) -> None:
+        """What was asked behind the last request is answered: a single reply that was kept back is the right one."""
+        held, self.held = self.held, None
+        if held is not None:
+            self.pending.proven(self, held)
+
+    def give_up(self) -> None:
+        """What was asked behind the last request is not answered in time."""
+        held, self.held = self.held, None
+        if held:
+            self.pending.unproven(self, held)
 
     def answer(self, value: Any) -> None:
         """Delivers a reply, or an error, to who listens."""
@@ -241,9 +354,8 @@ class Waiter(Generic[F]):
 
     def nudge(self) -> None:
         """Tells who listens that the reply may have been swallowed: the request may be sent again at once."""
-        if self.deliver and self.repeatable:
-            deliver, self.deliver = self.deliver, None
-            deliver(SWALLOWED)
+        if self.repeatable:
+            self.answer(SWALLOWED)
 
     def __enter__(self) -> Self:
         return self

@@ -16,10 +16,12 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from dobot_async.contract import LinkState, Unexpected
 from dobot_async.errors import ConnectionLost, ProtocolError, ReplyTimeout
-from dobot_async.link import MUTE, Link, LinkState, Posted, Unexpected
+from dobot_async.link import MUTE, Link
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import QUEUED, WRITE, Frame, Parser, request
+from dobot_async.posted import Posted
 from dobot_async.roundtrip import RoundTrip
 from dobot_async.transports import Transport
 from dobot_async.transports.memory import memory_pair
@@ -527,6 +529,39 @@ async def test_who_is_answered_after_a_swallowed_reply_is_not_measured() -> None
         await far.say(numbered(asked, 1), numbered(again, 2))
         assert await call == 1
         assert trip.smoothed is None
+
+
+async def test_an_answer_that_is_late_alone_answers_nobody_whenever_it_comes() -> None:
+    """Asked without a pause, so that it comes between a question and its answer."""
+    for moment in (1.5, 1.5004, 1.5008, 1.5012):
+        near, other = memory_pair(in_flight=8, buffer=1000)
+        far = Far(other)
+        link = Link(near, Parser(), request, url="memory:", fences=(c.GET_DEVICE_NAME, c.GET_DEVICE_ID))
+        async with aclosing(other), aclosing(link):
+            with pytest.raises(ReplyTimeout):
+                await link.request(TIME, None, timeout=0.05)
+
+            late = await far.one()
+            began, number, asked = now(), 1, start(link.request(TIME, None, timeout=1.0))
+            came = False
+            while now() < began + 2.0:
+                for frame in await far.arrived():
+                    await asyncio.sleep(0.0005)
+                    if not came and now() >= began + moment:
+                        came = True
+                        await far.say(numbered(late, 0))
+
+                    number += frame.id == TIME.id
+                    await far.say(numbered(frame, number) if frame.id == TIME.id else frame._replace(params=bytes(12)))
+
+                await asyncio.sleep(0)
+                if asked.done():
+                    assert asked.result() > 1
+                    asked = start(link.request(TIME, None, timeout=1.0))
+
+            assert came
+            asked.cancel()
+            await asyncio.wait([asked])
 
 
 async def test_filler_goes_before_the_request_that_follows_three_unanswered_ones() -> None:

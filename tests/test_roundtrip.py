@@ -71,14 +71,44 @@ def test_a_sample_takes_back_all_growth() -> None:
     assert trip.timeout == measured(0.04, 0.04).timeout
 
 
-def test_a_long_outage_is_not_remembered_beyond_the_ceiling() -> None:
+def test_a_long_outage_makes_it_four_times_as_long_and_no_longer() -> None:
     trip = RoundTrip()
     for _ in range(1000):
         trip.unanswered()
 
-    assert trip.timeout == CEILING
+    assert trip.timeout == 4 * INITIAL
     trip.sample(0.01)
-    assert trip.timeout < CEILING
+    assert trip.timeout < INITIAL
+
+
+def test_who_was_asked_again_tells_at_least_how_long_to_wait_next() -> None:
+    trip = measured(0.03)
+    trip.unanswered()
+    trip.probably(0.2)
+    assert trip.timeout == pytest.approx(0.22)
+    trip.unanswered()
+    assert trip.timeout == pytest.approx(0.22)
+    trip.probably(0.0)
+    assert trip.timeout == measured(0.03).timeout
+
+
+@given(st.floats(0.03, 0.4), st.floats(0.002, 0.02))
+def test_a_link_that_becomes_slower_is_measured_after_few_requests(slow: float, fast: float) -> None:
+    """As the link does it: asked again at each timeout, a sample only if it was asked once."""
+    trip = measured(*[fast] * 20)
+    for _ in range(8):
+        sends, now = [0.0], trip.timeout
+        while now < slow:
+            trip.unanswered()
+            sends.append(now)
+            now += trip.timeout
+
+        if len(sends) == 1:
+            break
+
+        trip.probably(slow - sends[-2])
+    else:
+        pytest.fail("never asked once only")
 
 
 @given(st.lists(st.one_of(seconds, st.just("unanswered"))))

@@ -23,9 +23,10 @@ from dobot_async.magician.kinematics import Kinematics
 from dobot_async.magician.queue import MagicianQueue
 from dobot_async.magician.reach import check_reach as check_target
 from dobot_async.magician.verbs import Verbs
+from dobot_async.magician.wifi import WiFi
 from dobot_async.motion import undisturbed
 from dobot_async.roundtrip import RoundTrip
-from dobot_async.transports import Transport, open_transport
+from dobot_async.transports import Transport, hidden, open_transport
 from dobot_async.wire import Command, Queueing
 
 __all__ = ["DeviceInfo", "Jog", "Magician"]
@@ -72,6 +73,15 @@ LEAVING: tuple[tuple[Command[Any, None], Any], ...] = (
 """What is said to the arm at once when its block is left by an error: nothing moves or burns after it."""
 
 
+FENCES = (
+    c.GET_END_EFFECTOR_PARAMS,
+    c.GET_PTP_COMMON_PARAMS,
+    c.GET_JOG_COMMON_PARAMS,
+    c.GET_CP_PARAMS,
+)
+"""Cheap to answer, and seldom asked: which answers are still to come shows by whether these have come."""
+
+
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
     """Who an arm is.
@@ -96,10 +106,12 @@ class Magician(Verbs[Awaitable[None]]):
         link: The connection, with its state, events and figures.
         queue: The arm's queue, with the same verbs.
         kinematics: The arm's geometry with the end effector that it had when it was connected.
+        wifi: Which network the arm joins, and whether it is in it.
     """
 
     def __init__(self, link: Link[frame.Frame], *, window: int, check_reach: bool) -> None:
         self.link = link
+        self.wifi = WiFi(link)
         self.kinematics = Kinematics()
         self._check_reach = check_reach
         self._executor = MagicianExecutor(link, window, self._check)
@@ -125,7 +137,7 @@ class Magician(Verbs[Awaitable[None]]):
         It never clears alarms, sets parameters or moves on its own.
 
         Args:
-            url: `serial:///dev/ttyUSB0`, `udp://192.168.1.20`, `tcp://host:port`, `sim:`.
+            url: `serial:///dev/ttyUSB0`, `udp://192.168.1.20`, `tcp://host:port`, `ble://NAME`, `sim:`.
             control: False for observers: only reads are sent, everything else raises ValueError.
             queue: "fresh" empties the arm's queue and starts it, so that nothing that an earlier program left behind
                 begins to move; "keep" leaves it as found.
@@ -157,9 +169,10 @@ class Magician(Verbs[Awaitable[None]]):
             frame.request,
             url=url,
             filler=frame.FILLER,
+            fences=FENCES,
             read_only=not control,
             round_trip=round_trip,
-            reopen=partial(opened, url, timeout) if reconnect else None,
+            reopen=partial(opened, getattr(transport, "url", url), timeout) if reconnect else None,
         )
         arm = cls(link, window=min(window, transport.window), check_reach=check_reach)
         try:
@@ -221,6 +234,7 @@ class Magician(Verbs[Awaitable[None]]):
         """Clears the alarms; what the arm was doing when they came up does not go on. Manual 2.5.2."""
         await self.queue.update()  # without its alarm a motion that failed looks like one that is done
         await self.link.request(c.CLEAR_ALL_ALARMS_STATE, None, timeout=timeout)
+        self._executor.alarms_cleared()
 
     async def recover(self) -> None:
         """Clears the alarms, empties the queue and starts it: the arm is ready for new commands."""
@@ -375,8 +389,9 @@ async def opened(url: str, timeout: float) -> Transport:
     try:
         async with asyncio.timeout(timeout):
             return await open_transport(url, arm="magician")
-    except TimeoutError:
-        raise ConnectFailed(f"{url} could not be opened within {timeout:.3g} s; is the address right?") from None
+    except TimeoutError as error:
+        why = getattr(error.__cause__, "__notes__", ["is the address right?"])[0]
+        raise ConnectFailed(f"{hidden(url)} could not be opened within {timeout:.3g} s; {why}") from None
 
 
 def silent(link: Link[frame.Frame]) -> ConnectFailed:

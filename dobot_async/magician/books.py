@@ -88,7 +88,10 @@ class Books:
         counted = next(attempt.counted for attempt in self.under_way if attempt.probe)
         commands = len(self.entries)
         probes = len(self.under_way) - commands
-        if counted is None or commands > 1 or (exact and probes == 1):
+        if counted is None and not exact:
+            # Of two that were taken the second may be the first one's copy.
+            counted = 0 if total == 1 else None
+        elif counted is None or commands > 1 or (exact and probes == 1):
             # All were taken, or none but the probe that got the index.
             counted = commands if total >= commands + probes else 0 if total == 1 else None
 
@@ -106,6 +109,7 @@ class Books:
             return None
 
         taken = [(entry, last + place) for place, entry in enumerate(entries, start=1)] if counted else []
-        surplus = max(0, total - (len(entries) if counted else 0) - probes)
+        # Not every probe need have been taken, but what was counted before the first of them was none of theirs.
+        surplus = max(0, counted - len(entries), total - (len(entries) if counted else 0) - probes)
         self.last, self.under_way = last + total, []
         return Verdict(taken, [] if counted else entries, self.last, surplus)

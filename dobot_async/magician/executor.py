@@ -13,27 +13,30 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from dobot_async.errors import MotionUnknown, ProtocolError, ReplyTimeout
 from dobot_async.executor import Accepted, Entry
-from dobot_async.link import Link, Posted
+from dobot_async.link import Link
 from dobot_async.magician import commands as c
 from dobot_async.magician.alarms import Alarm, decode, faults
 from dobot_async.magician.books import Attempt, Books, Verdict
 from dobot_async.magician.frame import Frame
 from dobot_async.magician.reach import destination, is_relative
+from dobot_async.posted import Posted
 from dobot_async.wire import Command, Number, u64
 
 __all__ = ["MagicianExecutor", "Surplus"]
 
 Q = TypeVar("Q")
+R = TypeVar("R")
 INDEX: Number[int] = Number(u64)
-BUSY = 0.5  # seconds that a queued command waits for its turn on the link
 SILENCE = 5.0  # seconds without an answer after which the arm counts as lost, and what is under way as unknown
 GARBAGE = 1 << 32  # an index so far beyond the last one is what some firmware shows while it moves
 SAME_RUN = 0.95  # of the seconds that have passed, the arm's own clock has counted at least so many
-PROBES = 30  # in a row, none acknowledged although the arm answers what it is asked
+STANDSTILL = 1.0  # seconds between two poses of an arm that shows nonsense for an index
+RESTARTED = 0x00  # the alarm that an arm shows from power-up until it is cleared
+PROBES = 60  # in a row, none acknowledged although the arm answers what it is asked
 ARRIVED = 0.5  # mm and degrees
 
 
@@ -63,13 +66,18 @@ class MagicianExecutor:
         self._heard = -1
         self._completed = -1
         self._cleared = -1
+        self._summed_from = 0
         self._outages = 0
+        self._stood: c.Pose | None = None
+        self._questioned_at = -math.inf
+        self._restart_known = True
         self._uptime: tuple[float, float] | None = None
         self._capacity: int | None = None
         self._empty = False
+        self._verified = False
         self._left = 0
         self._relative: str | None = None
-        self._controlled_at = self._queued_at = -math.inf
+        self._controlled_at = self._posted_at = self._queued_at = -math.inf
         self._accepted: Accepted = lambda _entry, _ticket: None
         link.stray = self._stray
 
@@ -99,8 +107,7 @@ class MagicianExecutor:
         """Returns how many commands the arm's queue can still take; opens the books if it can. Manual 2.19.8."""
         left = await self._read_left()
         if left and self._books.last is None:
-            await self._open()
-            left -= 1
+            return left - 1 if await self._open() else 0
 
         return left
 
@@ -108,8 +115,8 @@ class MagicianExecutor:
         """Queues commands in order, at most `window` unacknowledged; returns early if the arm did not take them all."""
         await self.settle()
         self._accepted = accepted
-        if self._books.last is None:
-            await self._open()
+        if self._books.last is None and not await self._open():
+            return
 
         try:
             await self._stream(deque(entries))
@@ -129,13 +136,12 @@ class MagicianExecutor:
 
         if self._link.disorder and index > self._completed:
             # A doubled command shifts the indices of those behind it, so an index counts only if the sum is right.
+            began = self._now()
             surplus = await self._count()
             if surplus is None or self._books.last is None:
                 return None
 
-            if surplus > 0 and not self._books.under_way:
-                self._books.last += surplus
-                self._surplus(surplus)
+            self._recount(surplus, began)
 
         self._completed = max(self._completed, index)
         if index == self._books.last and not self._books.under_way:
@@ -145,7 +151,11 @@ class MagicianExecutor:
 
     async def faults(self) -> Sequence[Alarm]:
         """Returns the alarms that keep the arm from moving. Manual 2.5.1."""
-        return faults(decode(await self._link.request(c.GET_ALARMS_STATE, None, timeout=SILENCE)))
+        return faults(await self._alarms())
+
+    def alarms_cleared(self) -> None:
+        """Takes note that the alarms were cleared: that of a restart can only come from a new one."""
+        self._restart_known = False
 
     async def stands_at(self, entry: Entry) -> bool:
         """Returns whether the arm stands where an absolute motion leads."""
@@ -153,17 +163,15 @@ class MagicianExecutor:
         if target is None:
             return False
 
-        pose = await self._link.request(c.GET_POSE, None)
+        pose = await self._ask(c.GET_POSE)
         here = (pose.j1, pose.j2, pose.j3, pose.j4) if target.joints else (pose.x, pose.y, pose.z, pose.r)
         return math.dist(here, target.numbers) < ARRIVED
 
     async def halt(self) -> None:
         """Stops the arm where it is, jogs included, ahead of everything else. Manual 2.19.3 and 2.10.4."""
         await asyncio.gather(
-            self._link.request(c.SET_QUEUED_CMD_FORCE_STOP_EXEC, None, timeout=SILENCE, urgent=True),
-            self._link.request(
-                c.SET_JOG_CMD, c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE), timeout=SILENCE, urgent=True
-            ),
+            self._ask(c.SET_QUEUED_CMD_FORCE_STOP_EXEC, urgent=True),
+            self._ask(c.SET_JOG_CMD, c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE), urgent=True),
         )
         self._controlled_at = self._now()
 
@@ -197,9 +205,9 @@ class MagicianExecutor:
             await self._link.request(c.SET_QUEUED_CMD_STOP_DOWNLOAD, None, urgent=True)
 
     async def _control(self, command: Command[None, None]) -> None:
-        """Sends a command that steers the queue, so late that no doubled one of those before can undo it."""
-        await self._sleep_until(self._controlled_at + self._link.disorder)
-        await self._link.request(command, None, timeout=SILENCE, urgent=True)
+        """Sends a command that steers the queue, so late that nothing that was sent before arrives behind it."""
+        await self._sleep_until(max(self._controlled_at, self._posted_at) + self._link.disorder)
+        await self._ask(command, urgent=True)
         self._controlled_at = self._now()
 
     async def _stream(self, todo: deque[Entry]) -> None:
@@ -233,24 +241,37 @@ class MagicianExecutor:
 
         Either the command or its acknowledgement may be on its way a second time: it takes the disorder of both ways.
         """
-        if not self._link.disorder or self._books.under_way:
+        if not self._link.disorder or self._books.under_way or self._verified:
             return
 
         await self._sleep_until(self._queued_at + 2 * self._link.disorder)
-        surplus = await self._count()
-        if surplus and self._books.last is not None:
+        began = self._now()
+        self._recount(await self._count(), began)
+
+    def _recount(self, surplus: int | None, began: float) -> None:
+        """Brings the books up to date with a count that was made while nothing was under way."""
+        if surplus is None or self._books.last is None or self._books.under_way:
+            return
+
+        self._verified = began >= self._queued_at + 2 * self._link.disorder
+        if surplus:
             self._books.last += surplus
             self._surplus(surplus)
 
     async def _post(self, entry: Entry, *, probe: bool = False, counted: int | None = None) -> Posted[int]:
         """Sends a command, and enters it as under way."""
         await self._sleep_until(self._controlled_at + self._link.disorder)
-        if is_relative(entry.value):
-            self._relative = entry.command.name
 
-        self._empty = False
-        self._books.under_way.append(Attempt(entry, self._now(), probe, counted))
-        return await self._link.post(entry.frame, self._index_of, name=entry.command.name, timeout=BUSY)
+        def leaving() -> None:
+            self._posted_at, self._verified = self._now(), False
+            self._books.under_way.append(Attempt(entry, self._posted_at, probe, counted))
+            self._empty = False
+            if is_relative(entry.value):
+                self._relative = entry.command.name
+
+        return await self._link.post(
+            entry.frame, self._index_of, name=entry.command.name, timeout=SILENCE, leaving=leaving
+        )
 
     def _index_of(self, frame: Frame) -> int:
         """The index in an acknowledgement; one that was heard already is late or doubled."""
@@ -289,38 +310,59 @@ class MagicianExecutor:
 
         self._link.events.publish(Surplus(count))
 
-    async def _open(self) -> None:
-        """Opens the books with the index of a WAIT of 0 ms, and of one more for each that went unacknowledged."""
-        previous, clean = None, True
-        silent_at = self._now() + SILENCE
-        while self._books.last is None:
+    async def _open(self) -> bool:
+        """Opens the books with the index of a WAIT of 0 ms; returns whether the arm's queue had room for it."""
+        cleared = self._empty
+        for attempt in range(PROBES):
             index = await self._probe()
-            if index is not None and (clean or index - 1 == previous):
-                self._books.last = index
-            elif index is None and self._now() > silent_at:
-                raise ReplyTimeout("the arm does not acknowledge a WAIT of 0 ms; nothing was queued")
+            if index is not None:
+                self._books, self._summed_from = Books(index), index
+                if cleared and not attempt:
+                    self._cleared = self._summed_from = index - 1
+                elif attempt:
+                    await self._confirm(index)
 
-            previous, clean = index, False
+                return True
 
-        self._books.under_way = []
+            # What is asked behind a probe is answered behind its acknowledgement, which can be none of the next one's.
+            if not await self._read_left():
+                return False
+
+            await asyncio.sleep(2 * self._link.disorder)
+
+        raise ReplyTimeout("the arm does not acknowledge a WAIT of 0 ms; nothing was queued")
+
+    async def _confirm(self, index: int) -> None:
+        """Counts after the books were opened with difficulty, or finds out what there is to count from.
+
+        An arm that is paused has finished nothing yet: what lies in its queue is what it took since it was cleared.
+        """
+        more = await self._count()
+        if more:
+            self._books.last = index + more
+        elif more is None and self._capacity is not None:
+            self._cleared = self._summed_from = index + await self._read_left() - self._capacity
 
     async def _settle(self) -> list[Entry]:
         """Finds out what became of the commands under way, and enters it; returns those that the arm did not take."""
         books = self._books
         names = ", ".join(entry.command.name for entry in books.entries)
-        for _ in range(PROBES if books.under_way else 0):
+        for attempt in range(PROBES if books.under_way else 0):
             if books.last is None:
                 break  # the arm was switched off and on
 
             await self._sleep_until(books.under_way[-1].sent_at + self._link.disorder)
             try:
                 await self._link.opened()
+                if not attempt:
+                    await self._alarms()
+
                 counted = await self._count()
             except ReplyTimeout:
                 raise MotionUnknown(f"the arm fell silent and does not say whether it took {names}") from None
 
-            if counted is not None and not self._left:
-                # A probe would find no room.
+            if counted is not None and (self._link.disorder or not self._left):
+                # A probe would find no room, or prove nothing: its acknowledgement may be that of its second copy.
                 probes = books.probes
                 verdict = books.conclude(counted)
             else:
@@ -370,7 +412,8 @@ class MagicianExecutor:
     async def _count(self) -> int | None:
         """Counts by reading how many commands the arm took since the last one in the books; None if it does not add up.
 
-        What it took is what it has finished, or was told to forget, and what lies in its queue. If a command is
+        What it took is what it has finished, or was told to forget, and what lies in its queue; but what it was told to
+        forget before the books were opened is not known until it has finished something of ours. If a command is
         finished between the two readings, the sum is too high where the queue was read first, and too low where it was
         read last. What is queued, settled or cleared meanwhile makes them worthless.
         """
@@ -381,6 +424,9 @@ class MagicianExecutor:
         while (finished := await self._index()) is not None:
             last, _, cleared = state
             if last is None:
+                return None
+
+            if max(finished, cleared) < self._summed_from:
                 return None
 
             most = max(finished, cleared) + self._capacity - left - last
@@ -398,6 +444,15 @@ class MagicianExecutor:
         """What a count is made against."""
         return self._books.last, len(self._books.under_way), self._cleared
 
+    async def _alarms(self) -> tuple[Alarm, ...]:
+        """Reads the alarms; raises MotionUnknown if that of a restart has come up. Manual 2.5.1."""
+        known, alarms = self._restart_known, decode(await self._ask(c.GET_ALARMS_STATE))
+        self._restart_known = any(alarm.code == RESTARTED for alarm in alarms)
+        if self._restart_known and not known:
+            raise self._restarted()
+
+        return alarms
+
     async def _recognise(self) -> None:
         """Raises MotionUnknown if the arm was switched off and on: its clock and its indices begin anew."""
         await self._index()
@@ -411,17 +466,19 @@ class MagicianExecutor:
 
     async def _read_uptime(self) -> float:
         """Reads the seconds since power-up."""
-        return await self._link.request(c.GET_DEVICE_TIME, None, timeout=SILENCE) / 1000
+        return await self._ask(c.GET_DEVICE_TIME) / 1000
 
     def _restarted(self) -> MotionUnknown:
         self._completed = self._heard = self._cleared = -1
+        self._summed_from = 0
+        self._stood = None
         self._books = Books(under_way=self._books.under_way)  # until `reset`: their Motions are still to be ended
         return MotionUnknown("the arm was switched off and on: it counts its commands anew, and its queue is empty")
 
     async def _read_left(self) -> int:
         """Reads the left space; that of an empty queue is its capacity."""
         empty = self._empty
-        self._left = await self._link.request(c.GET_QUEUED_CMD_LEFT_SPACE, None, timeout=SILENCE)
+        self._left = await self._ask(c.GET_QUEUED_CMD_LEFT_SPACE)
         if empty and self._empty:
             self._capacity = self._left
 
@@ -429,15 +486,41 @@ class MagicianExecutor:
 
     async def _index(self) -> int | None:
         """Reads the index of the last finished command; None where firmware shows nonsense instead."""
-        index = await self._link.request(c.GET_QUEUED_CMD_CURRENT_INDEX, None, timeout=SILENCE)
+        index = await self._ask(c.GET_QUEUED_CMD_CURRENT_INDEX)
         last = self._books.last
         if last is not None and index > last + GARBAGE:
+            await self._question()
             return None
 
+        self._stood = None
         if index < self._completed:
             raise self._restarted()
 
         return index
+
+    async def _question(self) -> None:
+        """Raises MotionUnknown if an arm that shows nonsense for an index stands still.
+
+        What some firmware shows while it moves, all firmware shows from power-up until a command is finished.
+        """
+        if self._now() < self._questioned_at + STANDSTILL:
+            return
+
+        self._questioned_at = self._now()
+        before, self._stood = self._stood, await self._ask(c.GET_POSE)
+        if self._stood == before:
+            raise self._restarted()
+
+    async def _ask(self, command: Command[Q, R], value: Q | None = None, *, urgent: bool = False) -> R:
+        """Sends what may be repeated, however bad the line is; raises ReplyTimeout if the arm is silent to it."""
+        for last in (False, False, True):
+            try:
+                return await self._link.request(command, cast(Q, value), timeout=SILENCE, urgent=urgent, lenient=True)
+            except ReplyTimeout:
+                if last or self._link.heard_at < self._now() - SILENCE:
+                    raise
+
+        raise AssertionError
 
     async def _sleep_until(self, when: float) -> None:
         seconds = when - self._now()

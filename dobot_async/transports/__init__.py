@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from typing import Any, cast
 from urllib.parse import urlsplit
 
 from dobot_async.transports.base import Transport
 
-__all__ = ["SCHEMES", "Transport", "open_transport"]
+__all__ = ["SCHEMES", "Transport", "hidden", "open_transport"]
 
+TOKEN = re.compile(r"\btoken=[^&#]*")
 SCHEMES = {
     "serial": ("dobot_async.transports.serial", "serial:///dev/ttyUSB0, serial://COM3 (?baud=115200)"),
     "udp": ("dobot_async.transports.network", "udp://192.168.1.20 (port 8899)"),
     "tcp": ("dobot_async.transports.network", "tcp://host:port"),
+    "ws": ("dobot_async.transports.websocket", "ws://host:port (a bridge; ?token=)"),
+    "wss": ("dobot_async.transports.websocket", "wss://host:port (?token=&ca=)"),
+    "zenoh": ("dobot_async.transports.zenoh", "zenoh://NAME (a served arm; ?connect=tcp/host:port&config=FILE)"),
+    "ble": ("dobot_async.transports.ble", "ble://NAME, ble://ADDRESS, ble: (the first arm in range)"),
     "sim": ("dobot_async.simulator.endpoints", "sim: (?speed=10&seed=1&loss=0.05&latency=0.01)"),
 }
 
@@ -33,7 +39,12 @@ async def open_transport(url: str, *, arm: str) -> Transport:
         parts = urlsplit(url)
         return cast(Transport, await module_of(parts.scheme).open_url(parts, arm=arm))
     except ValueError as error:
-        raise ValueError(f"{url!r}: {error}") from None
+        raise ValueError(f"{hidden(url)!r}: {error}") from None
+
+
+def hidden(url: str) -> str:
+    """Returns a URL as it may be shown: without its token."""
+    return TOKEN.sub("token=...", url)
 
 
 def module_of(scheme: str) -> Any:

@@ -79,7 +79,7 @@ class Program:
     @property
     def roomy(self) -> bool:
         """Whether the arm's queue is never full."""
-        return self.sim.arm.device.options.capacity == ROOMY
+        return bool(self.sim.arm.device.options.capacity == ROOMY)
 
     @property
     def now(self) -> float:

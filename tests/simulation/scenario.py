@@ -153,6 +153,9 @@ class Run:
     async def play(self) -> None:
         """Takes all steps, a disaster among them if there is to be one."""
         disaster = self.random.randrange(self.plan.steps) if self.plan.disaster else -1
+        if self.plan.disaster == "power":
+            await self.arm.clear_alarms(timeout=PATIENT)  # so that the alarm of a restart tells
+
         for number in range(self.plan.steps):
             if number == disaster:
                 await self.strike()
@@ -455,7 +458,7 @@ async def play(seed: int, trace: Callable[[str], None] | None = None) -> Outcome
         answer = sim.arm.answer
 
         def recorded(frame: Frame) -> bytes:
-            reply = answer(frame)
+            reply: bytes = answer(frame)
             record.answered(loop.time(), frame, reply)
             if trace:
                 trace(f"{loop.time():10.4f}      arm  {named(frame)} -> {reply.hex(' ')}")

@@ -8,6 +8,20 @@ from soak import replay
 
 SEEDS = 200
 BLOCK = 10
+HARD = {
+    24392: "an increment that the network doubles, with both acknowledgements lost",
+    22128: "a power failure after which the index stays nonsense",
+    21616: "an acknowledgement that comes a command late when the books are opened",
+    30696: "a command that goes out while the queue is found empty",
+    31909: "a command whose second copy arrives behind the clear",
+    33188: "a put that is cancelled while it is under way and the arm is being stopped",
+    33840: "a count on an arm that is paused and has finished nothing since it was cleared",
+    34884: "a power failure after which the indices go on where the books stand",
+    37856: "an alarm that two readers find at once",
+    41596: "a restart that is found while the alarms are being cleared",
+    46348: "a full queue on a paused arm whose books were opened with difficulty",
+    83242: "books from before a power failure",
+}
 
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
@@ -19,6 +33,12 @@ def test_seeds(first: int) -> None:
         except BaseException as error:
             error.add_note(replay(seed))
             raise
+
+
+@pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
+@pytest.mark.parametrize("seed", HARD, ids=HARD.get)
+def test_seeds_that_once_broke_a_promise(seed: int) -> None:
+    run_seed(seed)
 
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
