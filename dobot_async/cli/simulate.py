@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import AsyncExitStack
 from typing import Any
 
 import click
 
+from dobot_async.cli.discover import Place
 from dobot_async.cli.session import ARMS, Session, run
 
 __all__ = ["simulate"]
@@ -39,28 +41,59 @@ def faults(command: click.decorators.FC) -> click.decorators.FC:
     default="pty",
     show_default=True,
     metavar="WHERE",
-    help="pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0; port 0 takes a free one.",
+    help="pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0 (port 0 takes a free one), or ble (Linux).",
 )
 @click.option("--speed", type=click.FloatRange(0, min_open=True), default=1.0, help="Simulated seconds per second.")
 @click.option("--seed", type=int, help="Of the faults, to have the same ones again.")
+@click.option(
+    "--announce",
+    type=Place(),
+    metavar="ADDRESS[:PORT]",
+    help="Answer searches for arms there, as an arm in the Wi-Fi does; 0.0.0.0 hears all broadcasts. "
+    "The arm has to listen at port 8899, as in --listen udp://0.0.0.0:8899.",
+)
 @faults
 @click.pass_obj
-def simulate(session: Session, /, arm: str | None, listen: str, speed: float, seed: int | None, **line: float) -> None:
+def simulate(
+    session: Session,
+    /,
+    arm: str | None,
+    listen: str,
+    speed: float,
+    seed: int | None,
+    announce: tuple[str, int] | None,
+    **line: float,
+) -> None:
     """Simulate an arm until Ctrl-C.
 
-    The first line of the output is the URL to connect to.
+    The first line of the output is the URL to connect to. Of ble, the second one is a variable that clients need in
+    their environment.
     """
-    run(serve(session, arm or session.arm, listen=listen, speed=speed, seed=seed, line=line))
+    run(serve(session, arm or session.arm, listen=listen, announce=announce, speed=speed, seed=seed, line=line))
 
 
-async def serve(session: Session, arm: str, *, listen: str, line: dict[str, Any], **details: Any) -> None:
+async def serve(
+    session: Session,
+    arm: str,
+    *,
+    listen: str,
+    announce: tuple[str, int] | None,
+    line: dict[str, Any],
+    **details: Any,
+) -> None:
     """Runs the simulator until it is cancelled."""
-    from dobot_async.simulator import Faults
+    from dobot_async.simulator import Faults, announced
     from dobot_async.simulator import simulate as simulated
 
     if listen == "memory":
         raise click.UsageError("memory is of no use to other programs; use pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0")
 
-    async with simulated(arm, listen=listen, faults=Faults(**line), **details) as simulation:
-        session.output.answer({"url": simulation.url}, simulation.url)
+    async with AsyncExitStack() as stack:
+        simulation = await stack.enter_async_context(simulated(arm, listen=listen, faults=Faults(**line), **details))
+        if announce:
+            await stack.enter_async_context(announced(simulation.url, *announce))
+
+        needs = simulation.environment
+        lines = [simulation.url, *(f"{name}={value}" for name, value in needs.items())]
+        session.output.answer({"url": simulation.url} | ({"environment": needs} if needs else {}), "\n".join(lines))
         await asyncio.Event().wait()

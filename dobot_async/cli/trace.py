@@ -2,7 +2,8 @@
 
     {"time": 1700000000.0, "direction": "out", "command": "GetPose", "value": null, "raw": "aa aa 02 0a 00 f6"}
 
-All names, layouts and sections are those of the command table.
+A Wi-Fi password is left out, and so are the length and the checksum, which tell something of it. All names, layouts
+and sections are those of the command table.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO
@@ -24,10 +25,12 @@ from dobot_async.magician import commands as c
 from dobot_async.magician.frame import Frame
 from dobot_async.wire import Command, Number, u64
 
-__all__ = ["REPLY", "REQUEST", "Trace", "raw", "readings", "tracing"]
+__all__ = ["REPLY", "REQUEST", "Trace", "described", "raw", "readings", "tracing"]
 
 INDEX = Number[int](u64)
 REQUEST, REPLY = "request", "reply"
+SECRET = {c.SET_WIFI_PASSWORD.id}
+MASK = "***"
 
 
 def readings(frame: Frame, roles: Iterable[str]) -> tuple[Command[Any, Any] | None, dict[str, Any]]:
@@ -52,15 +55,15 @@ def raw(frame: Frame) -> bytes:
 
 
 @contextmanager
-def tracing(path: str) -> Iterator[Trace]:
-    """Opens the file of a trace; "-" is standard error."""
+def tracing(path: str, describe: Callable[..., Mapping[str, Any]]) -> Iterator[Trace]:
+    """Opens the file of a trace; "-" is standard error. `describe` says what a line says of a frame, by its family."""
     if path == "-":
-        yield Trace(sys.stderr)
+        yield Trace(sys.stderr, describe)
         return
 
     file = opened(path)
     try:
-        yield Trace(file)
+        yield Trace(file, describe)
     finally:
         # What could not be written was told when it happened.
         with suppress(OSError):
@@ -70,16 +73,17 @@ def tracing(path: str) -> Iterator[Trace]:
 class Trace:
     """What a link calls with each frame: writes it as a line."""
 
-    def __init__(self, file: TextIO) -> None:
+    def __init__(self, file: TextIO, describe: Callable[..., Mapping[str, Any]] | None = None) -> None:
         self._file: TextIO | None = file
+        self._describe = describe or described
 
-    def __call__(self, outgoing: bool, frame: Frame) -> None:
+    def __call__(self, outgoing: bool, frame: Any) -> None:
         """Writes one frame; a file that cannot be written any more ends the trace and nothing else."""
         if self._file is None:
             return
 
         try:
-            self._file.write(json.dumps(described(frame, outgoing=outgoing)) + "\n")
+            self._file.write(json.dumps(self._describe(frame, outgoing=outgoing)) + "\n")
             self._file.flush()
         except OSError as error:
             # The next frame may be the one that stops the arm: it must get through whatever becomes of the disk.
@@ -100,17 +104,20 @@ def described(frame: Frame, *, outgoing: bool) -> dict[str, Any]:
     """What a trace says of a frame."""
     role = REQUEST if outgoing else REPLY
     command, values = readings(frame, [role])
-    line = {
-        "time": time.time(),
-        "direction": "out" if outgoing else "in",
-        "command": command and command.name,
-        "value": values.get(role),
-        "raw": raw(frame).hex(" "),
-    }
+    if frame.id in SECRET and frame.params:
+        return {**head(outgoing, command), "value": MASK, "raw": f"aa aa {MASK} {frame.id:02x} {frame.ctrl:02x} {MASK}"}
+
+    line = {**head(outgoing, command), "value": values.get(role), "raw": raw(frame).hex(" ")}
     if role not in values:
         line["problem"] = f"the parameters do not fit a {role}" if command else f"no command has the ID {frame.id}"
 
     return line
+
+
+def head(outgoing: bool, command: Command[Any, Any] | None) -> dict[str, Any]:
+    """When a frame went which way, and what it is called."""
+    direction = "out" if outgoing else "in"
+    return {"time": time.time(), "direction": direction, "command": command and command.name}
 
 
 def fits(row: Command[Any, Any], frame: Frame, roles: Iterable[str]) -> Iterator[tuple[str, Any]]:

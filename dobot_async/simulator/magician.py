@@ -198,11 +198,6 @@ def infrared(arm: SimulatedMagician, port: c.InfraredPort) -> int:
     return int(arm.infrared[port] and arm.state.get(c.SET_INFRARED_SENSOR, port).enable)
 
 
-def wifi_connected(arm: SimulatedMagician, _: None) -> bool:
-    """Whether there is a network to connect to, and its setting-up is over."""
-    return bool(arm.state.get(c.SET_WIFI_SSID)) and not arm.state.get(c.SET_WIFI_CONFIG_MODE)
-
-
 def level(arm: SimulatedMagician, address: int) -> c.IODI:
     """The level at a pin."""
     return c.IODI(address, int(arm.device.get_input((c.TriggerMode.IO, address))))
@@ -232,7 +227,7 @@ READS: Mapping[Command[Any, Any], Callable[[SimulatedMagician, Any], Any]] = {
     c.GET_IOADC: analog,
     c.GET_COLOR_SENSOR: color,
     c.GET_INFRARED_SENSOR: infrared,
-    c.GET_WIFI_CONNECT_STATUS: wifi_connected,
+    c.GET_WIFI_CONNECT_STATUS: lambda arm, _: arm.state.in_wifi,
     c.GET_UART4_PERIPHERALS_TYPE: lambda _arm, _: c.UART4PeripheralsType.UART,
     c.GET_USER_PARAMS: lambda _arm, _: c.UserParams((0.0,) * 8),
     c.GET_PTP_TIME: lambda arm, value: arm.ptp_time(value),

@@ -76,6 +76,19 @@ PINS: Mapping[Command[Any, None], Callable[[int], Any]] = {
 }
 """Registers that each pin (1 to 20) or port has for itself, and what is in them after power-up."""
 
+JOINING = 2.0
+"""Seconds that the Wi-Fi module needs to join a network, from the last setting on."""
+
+WIFI = {
+    c.SET_WIFI_CONFIG_MODE,
+    c.SET_WIFI_SSID,
+    c.SET_WIFI_PASSWORD,
+    c.SET_WIFI_IP_ADDRESS,
+    c.SET_WIFI_NETMASK,
+    c.SET_WIFI_GATEWAY,
+    c.SET_WIFI_DNS,
+}
+
 SLOTS = {c.SET_IO_MULTIPLEXING: "address", c.SET_IODO: "address", c.SET_IOPWM: "address", c.SET_INFRARED_SENSOR: "port"}
 
 
@@ -112,6 +125,7 @@ class State:
         motors: The two steppers.
         lost_steps: By how many degrees each joint stands elsewhere than the arm believes.
         levelled: The precision of the last levelling, 0 before it.
+        networks: The Wi-Fi networks in range, with their passwords; None for any, with any password.
     """
 
     def __init__(self, now: Callable[[], float], limits: JointLimits) -> None:
@@ -119,6 +133,8 @@ class State:
         self.motors = (Motor(now), Motor(now))
         self.lost_steps = [0.0, 0.0, 0.0, 0.0]
         self.levelled = 0.0
+        self.networks: Mapping[str, str] | None = None
+        self._now = now
         self._registers = {(row.id, 0): value for row, value in FLASH.items()}
         self.power_up()
 
@@ -129,6 +145,7 @@ class State:
         self._registers |= {(row.id, 0): value for row, value in POWER_UP.items()}
         self._lift: c.PTPJumpParams | c.PTPJump2Params = self.get(c.SET_PTP_JUMP_PARAMS)
         self.levelled = 0.0
+        self._wifi_since = self._now()
         for motor in self.motors:
             motor.run(0)
 
@@ -141,6 +158,9 @@ class State:
         """Does what a Set row does that takes no time."""
         slot = getattr(value, SLOTS[row]) if row in SLOTS else 0
         self._registers[row.id, slot] = value
+        if row in WIFI:
+            self._wifi_since = self._now()
+
         if isinstance(value, (c.PTPJumpParams, c.PTPJump2Params)):
             self._lift = value
 
@@ -149,6 +169,15 @@ class State:
         """The geometry with the end effector that is set."""
         bias = self.get(c.SET_END_EFFECTOR_PARAMS)
         return Kinematics(bias.x_bias, bias.y_bias, bias.z_bias, self.limits)
+
+    @property
+    def in_wifi(self) -> bool:
+        """Whether it has joined its network: some time has passed, the network is there, and the password right."""
+        ssid = self.get(c.SET_WIFI_SSID)
+        if not ssid or self.get(c.SET_WIFI_CONFIG_MODE) or self._now() < self._wifi_since + JOINING:
+            return False
+
+        return self.networks is None or self.networks.get(ssid) == self.get(c.SET_WIFI_PASSWORD)
 
     @property
     def has_rail(self) -> bool:

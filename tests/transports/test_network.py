@@ -12,8 +12,9 @@ from typing import Any
 import anyio
 import pytest
 
+from dobot_async.contract import LinkState
 from dobot_async.errors import ConnectFailed, ConnectionLost, ReplyTimeout
-from dobot_async.link import Link, LinkState
+from dobot_async.link import Link
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import Frame, Parser, request
 from dobot_async.transports import open_transport

@@ -64,7 +64,7 @@ def test_a_url_without_a_scheme_of_ours_is_shown_all_schemes(url: str) -> None:
         ("udp://192.168.1.20:99999", "[Pp]ort out of range"),
         ("udp://192.168.1.20/path", "expected udp://host"),
         ("udp://[fe80::1", "Invalid IPv6 URL"),
-        ("udp://192.168.1.20?baud=1", "unknown option 'baud'; known: disorder"),
+        ("udp://192.168.1.20?baud=1", "unknown option 'baud'; known: disorder, token"),
         ("tcp://192.168.1.20:1?window=1", "unknown option 'window'"),
         ("serial:", "expected serial:///dev/ttyUSB0"),
         ("serial://", "expected serial:///dev/ttyUSB0"),

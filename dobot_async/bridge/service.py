@@ -1,0 +1,352 @@
+"""The bridge itself: one link to the arm, many clients, and the lease that says whose motion it is.
+
+    client --Request--> refused?  denied, or somebody else moves the arm, or a stop came before it was sent
+                          |
+                          +- read   --> link, one of each key at a time, from one client after the other
+                          +- write  --> lease --> link, in the client's order, sent once
+                          `- stop   --> link, ahead of everything; what waits to be written is thrown away
+    client <-- the reply, and nobody else gets it
+
+The lease is taken with the first write and ends with the connection. If the arm is then in the middle of a motion it
+is stopped, and until it has heard that nobody else may write. A stop by somebody else ends the lease and its
+holder's connection, too: a program whose motion was stopped behind its back must not take it for done.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Collection, Coroutine
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, Literal, TypeVar
+
+from dobot_async.bridge.client import Client, Refused, Request
+from dobot_async.bridge.limits import Limits
+from dobot_async.bridged import Bridged, Kind
+from dobot_async.contract import Frame, LinkState
+from dobot_async.errors import ConnectionLost, DobotError
+from dobot_async.events import Events
+from dobot_async.link import Link
+
+__all__ = ["Bridge", "BridgeEvent"]
+
+F = TypeVar("F", bound=Frame)
+logger = logging.getLogger("dobot_async.bridge")
+STOPPED_WITHIN = 1.0  # seconds until what stops the arm is said again
+FAREWELL = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class BridgeEvent:
+    """What happened at a bridge.
+
+    Attributes:
+        what: "connected", "left", "turned away", "cut", "refused", "lease", "released", "stopped", "link".
+        client: Whose affair it is, "" if it is nobody's.
+        detail: More of it, in words.
+    """
+
+    what: str
+    client: str
+    detail: str
+
+    def __str__(self) -> str:
+        return ": ".join(filter(None, (self.client, self.what, self.detail)))
+
+
+class Bridge(Generic[F]):
+    """A bridge that runs; made by `bridge`.
+
+    Attributes:
+        urls: Where it can be reached, in the order in which that was asked for.
+        token: What clients have to present on anything but this computer's own addresses; None if nothing.
+        family: How the arm is bridged.
+        link: The way to the arm.
+        events: What happens, as `BridgeEvent`s.
+        stops: How often something stopped the arm.
+    """
+
+    def __init__(
+        self,
+        link: Link[F],
+        family: Bridged[F],
+        *,
+        takeover: bool,
+        on_vanish: Literal["stop", "leave"],
+        denied: Collection[Any],
+        limits: Limits,
+    ) -> None:
+        self.urls: tuple[str, ...] = ()
+        self.token: str | None = None
+        self.link = link
+        self.events: Events[BridgeEvent] = Events()
+        self.stops = 0
+        self.family = family
+        self._takeover = takeover
+        self._on_vanish = on_vanish
+        self._denied = denied
+        self._limits = limits
+        self._clients: set[Client[F]] = set()
+        self._ended = False
+        self._holder: Client[F] | None = None
+        self._lease = asyncio.Lock()
+        self._farewells: set[asyncio.Task[None]] = set()
+        self._watching = asyncio.create_task(self._watch_link(), name="dobot_async bridge link")
+
+    @property
+    def url(self) -> str:
+        """Where it can be reached: the first of `urls`."""
+        return self.urls[0]
+
+    @property
+    def holder(self) -> str | None:
+        """Who may move the arm, None while nobody does."""
+        return self._holder.name if self._holder else None
+
+    @property
+    def clients(self) -> int:
+        """How many there are."""
+        return len(self._clients)
+
+    def moving(self, reply: F) -> bool | None:
+        """Returns whether the arm is in the middle of what its mover told it, None while nobody may move it.
+
+        Args:
+            reply: The arm's answer to the question of a `Watch`.
+        """
+        return self._holder.watch.moving(reply) if self._holder else None
+
+    async def ask(self, frame: F) -> F:
+        """Returns the arm's reply to a read of the bridge's own; raises DobotError if there is none."""
+        return await self._forward(frame)
+
+    def client(
+        self,
+        deliver: Callable[[bytes], None],
+        hang_up: Callable[[], None],
+        *,
+        ordered: bool,
+        hold: Callable[[bool], None] = lambda _: None,
+        name: str = "",
+    ) -> Client[F]:
+        """Called by a door: somebody was let in."""
+        client = Client(self, self.family, deliver, hang_up, hold=hold, name=name, ordered=ordered, limits=self._limits)
+        self._clients.add(client)
+        if self._ended or len(self._clients) > self._limits.clients:
+            reason = "the bridge has ended" if self._ended else "there are too many clients"
+            asyncio.get_running_loop().call_soon(self.cut, client, reason)
+        else:
+            self._tell("connected", client)
+
+        return client
+
+    def leave(self, client: Client[F]) -> None:
+        """Called by a door: a client has gone."""
+        if client.left:
+            return
+
+        client.leave()
+        self._begin(self._farewell(client))
+
+    def cut(self, client: Client[F], reason: str) -> None:
+        """Ends a connection."""
+        self._tell("cut", client, reason)
+        client.dismiss()
+        self._begin(self._end_lease(client))  # a datagram client leaves later
+
+    def refused(self, client: Client[F], name: str, reason: str) -> None:
+        """Takes note that a request was not passed on."""
+        self._tell("refused", client, f"{name}: {reason}")
+
+    def turned_away(self, name: str, reason: str) -> None:
+        """Takes note that somebody was not let in."""
+        self._tell("turned away", name, reason)
+
+    async def answer(self, client: Client[F], request: Request[F]) -> F:
+        """Returns the arm's reply; raises Refused, or DobotError if there is none."""
+        frame = request.frame
+        if frame.key in self._denied:
+            raise Refused("it is denied here")
+
+        self.family.check(frame)
+        if request.kind is Kind.STOP:
+            return await self._stop(client, frame)
+
+        if request.kind is Kind.WRITE:
+            return await self._write(client, request)
+
+        await client.reads.take(frame.key, 0)
+        try:
+            return await self._forward(frame, ready=partial(client.sending, request))
+        finally:
+            client.reads.give(frame.key)
+
+    def end(self) -> None:
+        """Ends all connections, and takes no more."""
+        self._ended = True
+        for client in list(self._clients):
+            client.dismiss()
+            self.leave(client)
+
+    async def aclose(self) -> None:
+        """Stops the arm if it moves for somebody, and ends everything; takes a few seconds at most."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(FAREWELL):
+                while self._farewells:
+                    await asyncio.wait(self._farewells)
+
+        for task in [self._watching, *self._farewells]:
+            task.cancel()
+
+        await asyncio.wait([self._watching, *self._farewells])
+        for client in list(self._clients):
+            await client.aclose()
+
+        self.events.close()
+        await self.link.aclose()
+
+    async def _stop(self, client: Client[F], frame: F) -> F:
+        """Passes on what stops the arm; nothing that was to be written before it is sent after it."""
+        self.stops += 1
+        if self._holder and self._holder is not client and not self._holder.gone:
+            self.cut(self._holder, f"{client.name} has stopped the arm")
+
+        client.watch.sent(frame)
+        return await self._forward(frame, urgent=True)
+
+    async def _write(self, client: Client[F], request: Request[F]) -> F:
+        """Passes on what changes something, once, for the holder of the lease."""
+        frame = request.frame
+        await self._take_lease(client)
+
+        def ready() -> None:
+            self._check(client)
+            if self._holder is not client:
+                raise Refused("the lease has ended")
+
+            if request.stops != self.stops:
+                raise Refused("the arm was stopped before it was sent")
+
+            client.watch.sent(frame)
+
+        reply = await self._forward(frame, ready=ready)
+        client.watch.answered(frame, reply)
+        return reply
+
+    async def _forward(self, frame: F, *, ready: Callable[[], None] = lambda: None, urgent: bool = False) -> F:
+        """Sends a frame to the arm and returns its reply."""
+        family = self.family
+        return await self.link.forward(
+            frame,
+            partial(family.accept, frame),
+            name=family.name(frame),
+            timeout=family.patience(frame),
+            repeatable=family.repeatable(frame),
+            urgent=urgent,
+            ready=ready,
+        )
+
+    def _check(self, client: Client[F]) -> None:
+        """Raises if a client has gone: what it has not sent to the arm yet is forgotten."""
+        if client.gone:
+            raise Refused("the client has gone")
+
+    async def _take_lease(self, client: Client[F]) -> None:
+        """Returns when this client may write."""
+        async with self._lease:
+            holder = self._holder
+            if holder is client:
+                return
+
+            self._check(client)
+            if holder and not holder.gone:
+                if not self._takeover:
+                    raise Refused(f"{holder.name} moves the arm")
+
+                self.cut(holder, f"{client.name} takes over")
+
+            if holder:
+                await self._release(holder)
+
+            self._holder = client
+            self._tell("lease", client, "moves the arm from now on")
+
+    async def _farewell(self, client: Client[F]) -> None:
+        """Ends the lease of a client that has gone, and lets its last requests end."""
+        try:
+            await self._end_lease(client)
+            await client.settled()
+        finally:
+            self._tell("left", client)
+            await client.aclose()
+            self._clients.discard(client)
+
+    async def _end_lease(self, client: Client[F]) -> None:
+        """Ends the lease of a client, if it has it."""
+        async with self._lease:
+            if self._holder is client:
+                await self._release(client)
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        """Begins with what the end of the bridge waits for."""
+        task = asyncio.create_task(work, name="dobot_async bridge farewell")
+        self._farewells.add(task)
+        task.add_done_callback(self._farewells.discard)
+
+    async def _release(self, holder: Client[F]) -> None:
+        """Ends a lease; stops the arm first if it is in the middle of something."""
+        with suppress(ConnectionLost):
+            if self._on_vanish == "stop" and await self._moves_for(holder):
+                await self._halt(holder)
+
+        self._holder = None
+        self._tell("released", holder, "anybody may move the arm")
+
+    async def _moves_for(self, holder: Client[F]) -> bool:
+        """Whether the arm is, or may be, in the middle of what a client has told it."""
+        if not holder.watch.moving(None):
+            return False
+
+        try:
+            return holder.watch.moving(await self._forward(holder.watch.question))
+        except ConnectionLost:
+            raise
+        except DobotError:
+            return True
+
+    async def _halt(self, holder: Client[F]) -> None:
+        """Stops the arm; says it until the arm has heard it, or the link is gone for good."""
+        while True:
+            await self.link.opened()
+            said = (self._urge(frame) for frame in self.family.stopping)
+            heard = await asyncio.gather(*said, return_exceptions=True)
+            if not isinstance(heard[0], BaseException):
+                self._tell("stopped", holder, "it has gone, and the arm was in motion")
+                return
+
+            if isinstance(heard[0], ConnectionLost):
+                raise heard[0]
+
+    async def _urge(self, frame: F) -> F:
+        """Says one of the things that stop the arm, again and again for a while."""
+        return await self.link.forward(
+            frame,
+            partial(self.family.accept, frame),
+            name=self.family.name(frame),
+            timeout=STOPPED_WITHIN,
+            repeatable=True,
+            urgent=True,
+        )
+
+    async def _watch_link(self) -> None:
+        """Tells when the link to the arm breaks and comes back."""
+        async for state in self.link.state:
+            words = {LinkState.OPEN: "the arm can be reached again", LinkState.REOPENING: "the line to the arm broke"}
+            self._tell("link", "", words.get(state, state.value))
+
+    def _tell(self, what: str, client: Client[F] | str, detail: str = "") -> None:
+        event = BridgeEvent(what, client if isinstance(client, str) else client.name, detail)
+        self.events.publish(event)
+        logger.info("%s", event)

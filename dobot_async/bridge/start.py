@@ -1,0 +1,115 @@
+"""Starts a bridge: the link to the arm first, then the doors; ends it in the other order."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Collection, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from dobot_async.bridge.doors import Doors, open_doors
+from dobot_async.bridge.limits import Limits
+from dobot_async.bridge.service import Bridge
+from dobot_async.bridged import Bridged
+from dobot_async.contract import Frame
+from dobot_async.errors import ConnectFailed, DobotError
+from dobot_async.link import Link
+from dobot_async.magician.bridged import BRIDGED
+from dobot_async.motion import undisturbed
+from dobot_async.transports import Transport, hidden, open_transport
+
+__all__ = ["bridge"]
+
+F = TypeVar("F", bound=Frame)
+
+
+@asynccontextmanager
+async def bridge(
+    arm_url: str,
+    *,
+    listen: str | Sequence[str] = "tcp://127.0.0.1:0",
+    token: str | None = None,
+    takeover: bool = False,
+    on_vanish: Literal["stop", "leave"] = "stop",
+    deny: Collection[str] = (),
+    certificate: str | Path | None = None,
+    key: str | Path | None = None,
+    origins: Collection[str] = (),
+    limits: Limits | None = None,
+    family: Bridged[Any] = BRIDGED,
+    timeout: float = 5.0,
+) -> AsyncIterator[Bridge[Any]]:
+    """Gives an arm to programs on a network for the length of a block.
+
+    Args:
+        arm_url: The arm, on any transport.
+        listen: Where programs reach it: `tcp://host:port`, `udp://host:port`, `ws://host:port`, `pty`; or several of
+            them. Port 0 takes a free one.
+        token: What clients have to present. Where it listens on more than this computer's own addresses there is
+            always one: it is made up if none is given.
+        takeover: Whoever writes takes the lease from who has it; else the first one keeps it.
+        on_vanish: "stop" stops the arm if its mover goes in the middle of a motion; "leave" lets it finish.
+        deny: Groups of commands that nobody may send: for a Magician "wifi", "calibration", "firmware".
+        certificate: PEM file with the certificate for TLS on tcp and ws.
+        key: PEM file with its key, if that is not in the same file.
+        origins: Web pages, as `https://host`, that may connect by ws without a token.
+        limits: What one client may do.
+        family: How the arm is bridged; the Magician's by default.
+        timeout: Seconds until the arm must have answered.
+
+    Raises:
+        ValueError: An argument is wrong.
+        ConnectFailed: No arm answered, or it cannot listen there.
+    """
+    unknown = set(deny) - family.denials.keys()
+    if unknown or on_vanish not in {"stop", "leave"}:
+        raise ValueError(f'expected deny to be of {", ".join(family.denials)}, and on_vanish "stop" or "leave"')
+
+    limits = limits or Limits()
+    doors = Doors.of([listen] if isinstance(listen, str) else listen, token, certificate, key, origins)
+    async with AsyncExitStack() as stack:
+        link = await linked(arm_url, family, timeout)
+        running: Bridge[Any] = Bridge(
+            link,
+            family,
+            takeover=takeover,
+            on_vanish=on_vanish,
+            denied={each for group in deny for each in family.denials[group]},
+            limits=limits,
+        )
+        stack.push_async_callback(lambda: undisturbed(running.aclose()))
+        await greet(running.link, family, timeout)
+        running.urls = await open_doors(doors, running, stack, running.turned_away)
+        running.token = doors.token
+        stack.callback(running.end)
+        yield running
+
+
+async def linked(url: str, family: Bridged[F], timeout: float) -> Link[F]:
+    """Opens the link to the arm, which reopens itself if it breaks."""
+    transport = await opened(url, family.model, timeout)
+    # `ble:` may be any arm at first, but not another one later.
+    again = partial(opened, getattr(transport, "url", url), family.model, timeout)
+    return Link(transport, family.parser(), family.encode, url=url, filler=family.filler, reopen=again)
+
+
+async def opened(url: str, model: str, timeout: float) -> Transport:
+    """Opens the transport in time."""
+    try:
+        async with asyncio.timeout(timeout):
+            return await open_transport(url, arm=model)
+    except TimeoutError:
+        raise ConnectFailed(f"{hidden(url)} could not be opened within {timeout:.3g} s") from None
+
+
+async def greet(link: Link[F], family: Bridged[F], timeout: float) -> None:
+    """Proves that an arm answers."""
+    frame = family.greeting
+    try:
+        await link.forward(
+            frame, partial(family.accept, frame), name=family.name(frame), timeout=timeout, repeatable=True
+        )
+    except DobotError as error:
+        raise ConnectFailed(f"no arm answers at {link.url}; is it switched on, and is this its address?") from error

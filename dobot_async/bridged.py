@@ -1,0 +1,117 @@
+"""What a bridge has to know of a family to pass its frames on between several programs and one arm.
+
+It is little, for the arm's answers mean nothing to a bridge: which frames only read, which stop, and what has to be
+known of the rest to tell whether the arm moves on behalf of a program that has gone.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+from dobot_async.contract import Encoder, Frame, Parser
+
+__all__ = ["Bridged", "Kind", "Reading", "Watch"]
+
+F = TypeVar("F", bound=Frame)
+
+
+class Kind(enum.Enum):
+    """What a request is to a bridge."""
+
+    READ = "read"
+    """Changes nothing; anybody may send it."""
+    WRITE = "write"
+    """Changes something, or moves the arm; one program at a time may send it."""
+    STOP = "stop"
+    """Makes the arm stop; anybody may send it, and it goes ahead of everything."""
+
+
+class Watch(Protocol[F]):
+    """What one program has made the arm do."""
+
+    @property
+    def question(self) -> F:
+        """The request whose answer tells whether the arm has finished."""
+
+    def sent(self, request: F) -> None:
+        """A request that is no read goes out."""
+
+    def answered(self, request: F, reply: F) -> None:
+        """It was answered."""
+
+    def moving(self, reply: F | None) -> bool:
+        """Returns whether the arm is, or may be, in the middle of what it was told; `reply` is that to the question."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading(Generic[F]):
+    """Something that a bridge reads by itself, for those who only look.
+
+    Attributes:
+        request: What it asks the arm.
+        period: Seconds from one reading to the next.
+        tell: What the reply says, as JSON can hold it.
+    """
+
+    request: F
+    period: float
+    tell: Callable[[F], Mapping[str, Any]]
+
+
+class Bridged(Protocol[F]):
+    """One family."""
+
+    @property
+    def model(self) -> str:
+        """What `sim:` is to simulate."""
+
+    @property
+    def filler(self) -> bytes:
+        """Bytes that end a half frame that the arm waits for."""
+
+    @property
+    def greeting(self) -> F:
+        """A read that any arm of the family answers."""
+
+    @property
+    def stopping(self) -> Sequence[F]:
+        """What stops the arm, and what it was told, and switches off what burns or turns; the stop comes first."""
+
+    @property
+    def denials(self) -> Mapping[str, Collection[Any]]:
+        """Groups of commands that can be blocked, by name: the keys of their frames."""
+
+    @property
+    def readings(self) -> Mapping[str, Reading[F]]:
+        """What those who only look may like to know, by name; "motion" asks the question of a `Watch`."""
+
+    @property
+    def encode(self) -> Encoder[F]:
+        """What makes frames of the family's commands."""
+
+    def parser(self) -> Parser[F]:
+        """Returns a parser for one stream."""
+
+    def watch(self) -> Watch[F]:
+        """Returns what follows one program."""
+
+    def kind(self, request: F) -> Kind:
+        """Returns what a request is."""
+
+    def name(self, request: F) -> str:
+        """Returns what people call a request; nothing of its parameters."""
+
+    def patience(self, request: F) -> float:
+        """Returns the seconds that an answer may take."""
+
+    def repeatable(self, request: F) -> bool:
+        """Returns whether it does no harm to send it again: never for what moves anything."""
+
+    def accept(self, request: F, reply: F) -> F:
+        """Returns the reply; raises ProtocolError if it cannot be one to this request."""
+
+    def check(self, request: F) -> None:
+        """Raises ProtocolError for a frame that the arm could not take."""

@@ -1,0 +1,76 @@
+"""`bridge`: one arm, on any transport, for several programs on a network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from dobot_async.cli.session import Session, run
+
+__all__ = ["FILE", "GROUPS", "bridge", "serve"]
+
+GROUPS = ("wifi", "calibration", "firmware")
+FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+@click.command(short_help="Give an arm to programs on a network.")
+@click.argument("source", metavar="SOURCE_URL")
+@click.argument("listen", metavar="LISTEN_URL...", nargs=-1, required=True)
+@click.option(
+    "--token",
+    envvar="DOBOT_BRIDGE_TOKEN",
+    help="What clients have to present. Others on this computer can see the arguments of a program: better set "
+    "DOBOT_BRIDGE_TOKEN, or give a file.",
+)
+@click.option("--token-file", type=FILE, help="A file with the token.")
+@click.option("--takeover", is_flag=True, help="Whoever moves the arm last may; else the first one, until it leaves.")
+@click.option(
+    "--on-vanish",
+    type=click.Choice(["stop", "leave"]),
+    default="stop",
+    show_default=True,
+    help="What becomes of a motion whose program has gone.",
+)
+@click.option("--deny", multiple=True, type=click.Choice(GROUPS), help="Commands that nobody may send; repeatable.")
+@click.option("--certificate", type=FILE, help="PEM file with a certificate: tcp and ws speak TLS.")
+@click.option("--key", type=FILE, help="PEM file with its key, if that is in another one.")
+@click.option("--origin", "origins", multiple=True, help="A web page, https://host, that needs no token; repeatable.")
+@click.pass_obj
+def bridge(session: Session, /, token: str | None, token_file: Path | None, **details: Any) -> None:
+    """Give the arm at SOURCE_URL to programs on a network, until Ctrl-C.
+
+    LISTEN_URL is one or more of tcp://127.0.0.1:9000, udp://127.0.0.1:8899, ws://127.0.0.1:8765, zenoh://NAME and pty;
+    port 0 takes a free one. The first lines of the output are the URLs to connect to, and the token if one had to be
+    made up: any address but this computer's own needs one. After them comes a line for whatever happens.
+    """
+    if session.trace:
+        raise click.UsageError("a bridge writes no trace: passwords go through it; trace the program that connects")
+
+    if token_file:
+        token = token_file.read_text(encoding="utf-8").strip()
+
+    run(serve(session, token=token, **details))
+
+
+async def serve(session: Session, *, source: str, token: str | None, **details: Any) -> None:
+    """Runs the bridge until it is cancelled."""
+    from dobot_async.bridge import bridge as bridged
+    from dobot_async.magician.bridged import BRIDGED
+
+    families = {"magician": BRIDGED}
+    if session.arm not in families:
+        raise click.UsageError(f"{session.arm} cannot be bridged yet")
+
+    async with bridged(source, token=token, family=families[session.arm], **details) as running:
+        answer: dict[str, Any] = {"urls": running.urls}
+        text = "\n".join(running.urls)
+        if running.token != token:
+            answer["token"] = running.token
+            text += f"\ntoken {running.token}"
+
+        events = aiter(running.events)
+        session.output.answer(answer, text)
+        async for event in events:
+            session.output.say(str(event))

@@ -1,0 +1,363 @@
+"""The simulated arm's BLE module: how it advertises, is connected to, written to, and notifies; as BlueZ's objects.
+
+    advertise --> connect --> resolved --> start_notify --> write ... notify --> lose
+       ^                                                                          |
+       '--------------------------------------------------------------------------'
+
+A step is announced to `watch` before it is taken, so that a test can break the connection in the middle of anything.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+
+from dbus_fast import Message
+
+from dobot_async.simulator.ble_names import (
+    CHARACTERISTIC,
+    DEVICE,
+    FAILED,
+    NOTIFIES_PATH,
+    SERVICE_UUID,
+    WRITES_PATH,
+    Refused,
+    Service,
+    device,
+    services,
+)
+from dobot_async.simulator.endpoints import Client, Simulation
+from dobot_async.simulator.radio import Air, Line, Radio
+
+__all__ = ["Module"]
+
+CONNECTING, RESOLVING, SUBSCRIBING = 2, 4, 2
+"""Connection events that these take."""
+
+NOBODY = 2.0
+"""Seconds after which BlueZ gives up to connect to somebody who is not there."""
+
+
+class Module:
+    """One arm's BLE module.
+
+    Attributes:
+        address: Of the radio.
+        url: What leads to it.
+        name: What it advertises.
+        late_name: Advertisements without the name before the first one that has it.
+        advertises_service: Whether the service's UUID is advertised.
+        writes: Which kinds of writes its input takes: "write-without-response", "write".
+        in_range: Whether it can be heard.
+        taken: Whether another computer or a phone is connected to it.
+        stuck: BlueZ does not come back from writes.
+        services: Whether it has the service at all.
+        disconnecting: Seconds that BlueZ takes to disconnect.
+        watch: Called with the name of each step before it is taken: connect, connected, resolved, start_notify, write,
+            arrive, notify.
+        written: The chunks of all connections, as they were written.
+        kinds: How each of them was written: "command" is without response, "request" with one.
+        connections: How many there have been.
+    """
+
+    def __init__(self, simulation: Simulation, radio: Radio, *, name: str, address: str) -> None:
+        self.radio = radio
+        self.name = name
+        self.address = address
+        self.url = f"ble://{address}"
+        self.path = ""
+        self.late_name = 0
+        self.advertises_service = False
+        self.writes = ["write-without-response"]
+        self.in_range = True
+        self.taken = False
+        self.stuck = False
+        self.services = True
+        self.disconnecting = 0.0
+        self.watch: Callable[[str], None] = lambda _: None
+        self.written: list[bytes] = []
+        self.kinds: list[str] = []
+        self.connections = 0
+        self._simulation = simulation
+        self._loop = asyncio.get_running_loop()
+        self._bluez: Service | None = None
+        self._air: Air | None = None
+        self._line: Line | None = None
+        self._connected = False
+        self._connecting: Message | None = None
+        self._writing: Message | None = None
+        self._subscribing: Message | None = None
+        self._listeners: set[str] = set()
+        self._heard = 0
+        self._timers: set[asyncio.TimerHandle] = set()
+        self._advertising = False
+
+    @property
+    def connected(self) -> bool:
+        """Whether BlueZ is connected to it."""
+        return self._connected
+
+    @property
+    def resolved(self) -> bool:
+        """Whether BlueZ knows its services."""
+        return bool(self._bluez and self._bluez.objects.get(self.path, DEVICE).get("ServicesResolved"))
+
+    def join(self, bluez: Service, adapter: str) -> None:
+        """Comes into the range of an adapter."""
+        self._bluez = bluez
+        self._adapter = adapter
+        self._heard = 0
+        self.path = f"{adapter}/dev_{self.address.replace(':', '_')}"
+
+    def forget(self) -> None:
+        """Nobody is there any more to be told of anything."""
+        self._break()
+        for timer in self._timers:
+            timer.cancel()
+
+        self._timers.clear()
+        self._listeners.clear()
+        self._advertising = False
+        self._bluez = None
+
+    def lose(self) -> None:
+        """The connection breaks, as it does when somebody walks away with the phone."""
+        bluez = self._bluez
+        if bluez and (self._air or self._connecting):
+            calls = self._break()
+            bluez.objects.change(self.path, DEVICE, Connected=False, ServicesResolved=False)
+            for call, text in calls:
+                bluez.refuse(call, Refused(FAILED, text))
+
+            self.advertise()
+
+    def vanish(self) -> None:
+        """BlueZ forgets the device, without a word of a connection that ends."""
+        if self._bluez:
+            self._break()
+            self._bluez.objects.remove(self.path)
+
+    def advertise(self) -> None:
+        """Advertises while somebody scans and nobody is connected."""
+        if not self._advertising and self._bluez:
+            self._advertising = True
+            self._later(self.radio.advertising, self._advertise)
+
+    def say(self, data: bytes) -> None:
+        """Notifies of bytes as if the arm had said them."""
+        size = self.radio.payload
+        if self._air:
+            for at in range(0, len(data), size):
+                self._air.back(partial(self._notify, data[at : at + size]))
+
+    def change_mtu(self, mtu: int) -> None:
+        """Both sides agree on another length of packets."""
+        self.radio.mtu = mtu
+        if self._bluez:
+            for path in (NOTIFIES_PATH, WRITES_PATH):
+                self._bluez.objects.change(f"{self.path}/{path}", CHARACTERISTIC, MTU=mtu)
+
+    def connect(self, call: Message) -> None:
+        """Device1.Connect."""
+        assert self._bluez
+        if self._connected:
+            self._bluez.answer(call)
+        elif self._connecting:
+            raise Refused("org.bluez.Error.InProgress", "In Progress")
+        else:
+            self._connecting = call
+            self.watch("connect")
+            if self._connecting is call and self.in_range and not self.taken:
+                self._air = Air(self.radio)
+                self._in_events(CONNECTING, self._up)
+            elif self._connecting is call:
+                self._later(NOBODY, lambda: self.lose() if self._connecting is call else None)
+
+    def disconnect(self, call: Message) -> None:
+        """Device1.Disconnect."""
+        assert self._bluez
+        bluez = self._bluez
+        if not self._air and not self._connecting:
+            raise Refused("org.bluez.Error.NotConnected", "Not Connected")
+
+        air = self._air
+
+        def done() -> None:
+            if self._air is air:
+                self.lose()
+
+            bluez.answer(call)
+
+        if self.disconnecting:
+            self._later(self.disconnecting, done)
+        else:
+            done()
+
+    def write(self, call: Message) -> None:
+        """GattCharacteristic1.WriteValue."""
+        data, options = call.body
+        kind = options["type"].value
+        flag = {"command": "write-without-response", "request": "write"}[kind]
+        if self._writing:
+            raise Refused("org.bluez.Error.InProgress", "In Progress")
+
+        self._check("write")
+        assert self._air
+        assert self._bluez
+        if flag not in self.writes or not (call.path or "").endswith(WRITES_PATH):
+            raise Refused("org.bluez.Error.NotSupported", "Operation is not supported")
+
+        if kind == "command" and len(data) > self.radio.payload:
+            raise Refused(FAILED, "Failed to initiate write")
+
+        self.written.append(bytes(data))
+        self.kinds.append(kind)
+        if self.stuck:
+            self._writing = call
+        elif kind == "command":
+            self._air.there(lambda: self._arrive(data))
+            self._bluez.answer(call)
+        else:
+            self._writing = call
+            self._air.there(lambda: self._arrive(data, confirm=True))
+
+    def start_notify(self, call: Message) -> None:
+        """GattCharacteristic1.StartNotify."""
+        self._check("start_notify")
+        if call.sender in self._listeners or self._subscribing:
+            raise Refused("org.bluez.Error.InProgress", "In Progress")
+
+        self._subscribing = call
+        self._in_events(SUBSCRIBING, self._subscribed)
+
+    def stop_notify(self, client: str) -> None:
+        """A client wants no notifications any more, or has left the bus."""
+        if client in self._listeners:
+            self._listeners.discard(client)
+            if self._bluez and not self._listeners:
+                self._bluez.objects.change(f"{self.path}/{NOTIFIES_PATH}", CHARACTERISTIC, Notifying=False)
+
+    def _check(self, step: str) -> None:
+        """Announces a step; it can be taken only while the connection lasts."""
+        self.watch(step)
+        if not self._connected:
+            raise Refused(FAILED, "Not connected")
+
+    def _advertise(self) -> None:
+        bluez = self._bluez
+        self._advertising = False
+        if not bluez or not bluez.scanning or self._air or self._connecting:
+            return
+
+        if self.in_range and not self.taken:
+            self._heard += 1
+            named = {"Name": self.name, "Alias": self.name} if self._heard > self.late_name else {}
+            rssi = -50 - self._heard % 2
+            if self.path in bluez.objects:
+                bluez.objects.change(self.path, DEVICE, RSSI=rssi, **named)
+            else:
+                services = [SERVICE_UUID] if self.advertises_service else []
+                known = device(self._adapter, self.address) | {"RSSI": rssi, "UUIDs": services} | named
+                bluez.objects.add(self.path, DEVICE, **known)
+
+        self.advertise()
+
+    def _up(self) -> None:
+        """The connection is there; its services are not known yet."""
+        self.watch("connected")
+        if not self._air or not self._bluez or not self._connecting:
+            return
+
+        call, self._connecting = self._connecting, None
+        self._connected = True
+        self.connections += 1
+        self._line = self._plugged_in()
+        self._bluez.objects.change(self.path, DEVICE, Connected=True)
+        self._bluez.answer(call)
+        self._in_events(RESOLVING, self._resolved)
+
+    def _plugged_in(self) -> Line:
+        """Makes the line to the arm; the arm may have itself unplugged."""
+
+        def deliver(data: bytes) -> None:
+            client.send(data)
+
+        def unplugged() -> None:
+            line.cut()
+            self.lose()
+
+        line = Line(deliver, self.say, lambda: self._simulation.leave(client))
+        client: Client = self._simulation.client(line.answer, unplugged, ordered=True)
+        return line
+
+    def _resolved(self) -> None:
+        """The services are known."""
+        self.watch("resolved")
+        if not self._connected or not self._bluez:
+            return
+
+        objects = self._bluez.objects
+        for path, interface, properties in services(self.path, self.writes) if self.services else ():
+            if path not in objects:
+                objects.add(path, interface, **properties)
+
+        self.change_mtu(self.radio.mtu)
+        objects.change(self.path, DEVICE, ServicesResolved=True, UUIDs=[SERVICE_UUID] if self.services else [])
+
+    def _subscribed(self) -> None:
+        if self._subscribing and self._bluez:
+            call, self._subscribing = self._subscribing, None
+            self._listeners.add(call.sender or "")
+            self._bluez.objects.change(f"{self.path}/{NOTIFIES_PATH}", CHARACTERISTIC, Notifying=True)
+            self._bluez.answer(call)
+
+    def _arrive(self, data: bytes, *, confirm: bool = False) -> None:
+        """A chunk reaches the module, which hands it on; a write that wants it is confirmed."""
+        self.watch("arrive")
+        if self._line and self._air:
+            self._line.send(data)
+            if confirm:
+                self._air.back(self._confirmed)
+
+    def _confirmed(self) -> None:
+        if self._writing and self._bluez:
+            call, self._writing = self._writing, None
+            self._bluez.answer(call)
+
+    def _notify(self, chunk: bytes) -> None:
+        self.watch("notify")
+        if self._connected and self._bluez and self._listeners:
+            self._bluez.objects.change(f"{self.path}/{NOTIFIES_PATH}", CHARACTERISTIC, Value=chunk)
+
+    def _break(self) -> list[tuple[Message, str]]:
+        """Ends the connection; returns the calls that fail by that, with what BlueZ says."""
+        failing = [
+            (self._connecting, "le-connection-abort-by-local"),
+            (self._writing, "Operation failed with ATT error: 0x0e"),
+            (self._subscribing, "Not connected"),
+        ]
+        self._connecting = self._writing = self._subscribing = None
+        self._connected = False
+        air, self._air = self._air, None
+        line, self._line = self._line, None
+        if air:
+            air.close()
+
+        if line:
+            line.end()
+
+        return [(call, text) for call, text in failing if call]
+
+    def _in_events(self, events: int, then: Callable[[], None]) -> None:
+        """Does something after some connection events, if the connection lasts."""
+        air = self._air
+        assert air
+        self._keep(air.after(events, lambda: then() if self._air is air else None))
+
+    def _later(self, seconds: float, then: Callable[[], None]) -> None:
+        self._keep(self._loop.call_later(seconds, then))
+
+    def _keep(self, timer: asyncio.TimerHandle) -> None:
+        now = self._loop.time()
+        self._timers = {each for each in self._timers if each.when() >= now and not each.cancelled()} | {timer}

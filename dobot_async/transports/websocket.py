@@ -1,0 +1,124 @@
+"""WebSocket, to a bridge: bytes of the protocol in binary messages, cut anywhere. Needs the `bridge` extra."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from types import ModuleType
+from typing import Any
+from urllib.parse import SplitResult
+
+import anyio
+
+from dobot_async.errors import ConnectFailed
+from dobot_async.transports.base import MANY, Transport, options
+from dobot_async.transports.network import WINDOW, secret, trust
+
+__all__ = ["WebSocketTransport", "open_url", "quiet", "websockets"]
+
+PING, PONG_WITHIN = 3.0, 6.0  # seconds; so a computer that is gone is noticed
+CLOSE = 1.0
+UNAUTHORIZED = 401
+
+
+async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001
+    """Opens `ws://host:port` or `wss://host:port`; both take `?token=`, and wss `?ca=` as tcp does."""
+    known: dict[str, Any] = {"token": secret, "ca": str} if url.scheme == "wss" else {"token": secret}
+    given = options(url, known)
+    if not url.hostname or url.port == 0 or url.path.strip("/"):
+        raise ValueError(f"expected {url.scheme}://host:port")
+
+    client = websockets("client")
+    place = f"{url.scheme}://{url.netloc}"
+    try:
+        socket = await client.connect(
+            place,
+            additional_headers={"Authorization": f"Bearer {given['token']}"} if "token" in given else {},
+            ssl=trust(given.get("ca")) if url.scheme == "wss" else None,
+            compression=None,
+            ping_interval=PING,
+            ping_timeout=PONG_WITHIN,
+            close_timeout=0.5,
+            proxy=None,
+            logger=quiet(),
+        )
+    except OSError as error:
+        raise ConnectFailed(f"cannot reach {place}: {error}; is the address right, and does a bridge run?") from error
+    except websockets("exceptions").InvalidHandshake as error:
+        response = getattr(error, "response", None)
+        wrong = "its token is another one" if getattr(response, "status_code", 0) == UNAUTHORIZED else str(error)
+        raise ConnectFailed(f"{place} does not let this client in: {wrong}") from error
+
+    return WebSocketTransport(socket, websockets("exceptions").ConnectionClosed)
+
+
+def websockets(module: str) -> ModuleType:
+    """Returns a module of the websockets library; raises ConnectFailed where it is not installed."""
+    try:
+        from websockets import exceptions  # noqa: PLC0415 - only who uses WebSocket needs it
+        from websockets.asyncio import client, server  # noqa: PLC0415
+    except ImportError:
+        raise ConnectFailed("ws:// needs the package websockets: pip install 'dobot-async[bridge]'") from None
+
+    return {"client": client, "server": server, "exceptions": exceptions}[module]
+
+
+def quiet() -> logging.Logger:
+    """Returns a logger that says nothing: the library would write the token down."""
+    logger = logging.getLogger("dobot_async.websockets")
+    logger.disabled = True
+    return logger
+
+
+class WebSocketTransport:
+    """An open WebSocket."""
+
+    in_flight = MANY
+    window = WINDOW
+    disorder = 0.0
+
+    def __init__(self, socket: Any, closed: type[Exception]) -> None:
+        self._socket = socket
+        self._closed = closed
+        self._closing = False
+
+    async def send(self, data: bytes) -> None:
+        """Sends one binary message."""
+        if self._closing:
+            raise anyio.ClosedResourceError
+
+        try:
+            await self._socket.send(data)
+        except self._closed as error:
+            raise anyio.BrokenResourceError from error
+
+    async def receive(self) -> bytes:
+        """Returns the next binary message; text is for people, and left out."""
+        while True:
+            if self._closing:
+                raise anyio.ClosedResourceError
+
+            try:
+                message = await self._socket.recv()
+            except self._closed as error:
+                if self._closing:
+                    raise anyio.ClosedResourceError from None
+
+                raise anyio.BrokenResourceError from error
+
+            if isinstance(message, bytes) and message:
+                return message
+
+    async def aclose(self) -> None:
+        """Closes it, within a second."""
+        self._closing = True
+        try:
+            async with asyncio.timeout(CLOSE):
+                await self._socket.close()
+        except TimeoutError:
+            self._socket.transport.abort()
+        except BaseException:
+            self._socket.transport.abort()
+            raise
+
+        await self._socket.wait_closed()

@@ -1,0 +1,168 @@
+"""The pace of a serial line, on a virtual clock, and a simulated arm behind it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from virtual import run_virtual, virtual
+
+from dobot_async import Magician
+from dobot_async.simulator import simulate
+from dobot_async.transports.baud import AHEAD, AtBaud, SerialLine, Wired
+
+BAUD = 115200
+BYTE = 10 / BAUD
+MILLISECOND = 0.001
+TICK = 2e-6  # of the virtual clock
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+@virtual
+async def test_the_last_bit_of_what_was_sent_arrives_when_the_baud_rate_says() -> None:
+    arrived: list[tuple[float, bytes]] = []
+    line = SerialLine(BAUD, lambda data: arrived.append((now(), data)))
+    begun = now()
+    line.send(bytes(38))
+    await asyncio.sleep(1)
+    assert sum(len(data) for _, data in arrived) == 38
+    assert arrived[-1][0] - begun == pytest.approx(38 * BYTE, abs=TICK)
+    assert all(len(data) * BYTE <= MILLISECOND for _, data in arrived)
+    begun = now()
+    line.send(b"x")
+    await asyncio.sleep(1)
+    assert arrived[-1][0] - begun == pytest.approx(BYTE, abs=TICK)
+    assert arrived[-1][1] == b"x"
+
+
+@given(st.lists(st.tuples(st.floats(0, 0.05), st.binary(min_size=1, max_size=300)), max_size=20))
+def test_each_byte_arrives_once_in_order_and_at_most_a_piece_late(messages: list[tuple[float, bytes]]) -> None:
+    async def check() -> None:
+        arrived: list[float] = []
+        received = bytearray()
+
+        def deliver(data: bytes) -> None:
+            arrived.extend([now()] * len(data))
+            received.extend(data)
+
+        line = SerialLine(BAUD, deliver)
+        due: list[float] = []
+        free_at = 0.0
+        for pause, data in messages:
+            await asyncio.sleep(pause)
+            for _ in data:
+                free_at = max(free_at, now()) + BYTE
+                due.append(free_at)
+
+            line.send(data)
+
+        await asyncio.sleep(1)
+        assert received == b"".join(data for _, data in messages)
+        assert not line.backlog
+        late = [came - ought for came, ought in zip(arrived, due, strict=True)]
+        assert all(-TICK < each < MILLISECOND + TICK for each in late)
+
+    run_virtual(check())
+
+
+@virtual
+async def test_a_long_transfer_does_not_drift() -> None:
+    last = 0.0
+
+    def deliver(_: bytes) -> None:
+        nonlocal last
+        last = now()
+
+    line = SerialLine(BAUD, deliver)
+    begun = now()
+    line.send(bytes(115_200))
+    await asyncio.sleep(20)
+    assert last - begun == pytest.approx(10, abs=TICK)
+
+
+@virtual
+async def test_what_was_cleared_never_arrives() -> None:
+    arrived: list[bytes] = []
+    line = SerialLine(BAUD, arrived.append)
+    line.send(bytes(100))
+    line.clear()
+    await asyncio.sleep(1)
+    assert not arrived
+    assert not line.backlog
+
+
+class Echo:
+    """A host that sends back what it gets."""
+
+    def __init__(self) -> None:
+        self.gone: list[EchoClient] = []
+
+    def client(
+        self,
+        deliver: Callable[[bytes], None],
+        hang_up: Callable[[], None],
+        *,
+        ordered: bool,
+        hold: Callable[[bool], None] = lambda _: None,
+        name: str = "",
+    ) -> EchoClient:
+        return EchoClient(deliver)
+
+    def leave(self, client: EchoClient) -> None:
+        self.gone.append(client)
+
+
+class EchoClient:
+    def __init__(self, deliver: Callable[[bytes], None]) -> None:
+        self.send = deliver
+
+
+@virtual
+async def test_both_ways_have_their_own_line_and_a_client_far_ahead_is_held() -> None:
+    received = bytearray()
+    holds: list[bool] = []
+    host = Echo()
+    slow = AtBaud(host, BAUD)
+    client: Wired[EchoClient] = slow.client(received.extend, lambda: None, ordered=True, hold=holds.append)
+    client.send(bytes(AHEAD + 100))
+    assert holds == [True]
+    await asyncio.sleep((AHEAD + 100) * BYTE + TICK)
+    assert holds == [True, False]
+    assert len(received) >= AHEAD  # the echo comes while the rest is still on its way
+    await asyncio.sleep(MILLISECOND)
+    assert len(received) == AHEAD + 100
+    client.send(b"lost")
+    slow.leave(client)
+    await asyncio.sleep(1)
+    assert len(received) == AHEAD + 100
+    assert host.gone == [client.peer]
+
+
+@pytest.mark.skipif(not Path("/dev/ptmx").exists(), reason="no pseudo-terminals")
+async def test_a_simulated_arm_at_115200_baud_is_no_faster_than_its_line() -> None:
+    async with simulate(listen="pty:?baud=115200", speed=50) as sim, Magician.connect(sim.url, window=8) as arm:
+        begun = now()
+        pose = await arm.get_pose()
+        assert now() - begun > 44 * BYTE
+        assert pose.x == pytest.approx(sim.arm.pose.x)
+        async with arm.queue.batch() as batch:
+            motions = [batch.move_to(220, y, 40) for y in range(20)]
+
+        await motions[-1]
+        counters = sim.arm.counters
+        assert (counters.overflowed, counters.junk_bytes, counters.bad_frames) == (0, 0, 0)
+        assert arm.link.stats.junk_bytes == arm.link.stats.timeouts == 0
+
+
+@pytest.mark.parametrize("listen", ["pty:?baud=0", "pty:?baud=fast", "pty:?speed=1", "pty://x", "pty:"])
+async def test_wrong_options_are_named(listen: str) -> None:
+    with pytest.raises(ValueError, match=r"baud|speed|cannot listen"):
+        async with simulate(listen=listen):
+            pass
