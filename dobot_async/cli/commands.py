@@ -3,38 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+from typing import Any
 
 import click
 
-from dobot_async.cli.output import joint_words, tool_words
+from dobot_async.cli.families import FAMILIES, Told, chosen
 from dobot_async.cli.session import Session
-from dobot_async.magician.alarms import Alarm
-from dobot_async.magician.arm import Jog, Magician
-from dobot_async.magician.params import Pose, PTPMode
 
-__all__ = ["COMMANDS", "MODES", "ON_OFF"]
+__all__ = ["COMMANDS", "ON_OFF"]
 
-MODES = {mode.name.lower().removesuffix("_xyz").replace("_", "-"): mode for mode in PTPMode}
-"""The ways to move, by the words for them: movj, movl, jump, ..., movj-angle, movl-inc, ..."""
-
-DIRECTIONS = {each.name.lower().replace("_plus", "+").replace("_minus", "-"): each for each in Jog}
+MODES = list(dict.fromkeys(mode for family in FAMILIES.values() for mode in family.modes))
+DIRECTIONS = list(dict.fromkeys(direction for family in FAMILIES.values() for direction in family.directions))
 ON_OFF = {"on": True, "off": False}
 
 
 @click.command()
 @click.pass_obj
 def info(session: Session) -> None:
-    """Tell serial number, name and firmware version."""
-    found = session.ask(Magician.get_info, control=False)
-    text = f"serial number  {found.serial_number}\nname           {found.name}\nfirmware       {found.version}"
-    session.output.answer(found, text)
+    """Tell who the arm is: serial number, name and firmware version, as far as it tells them."""
+    answer(session, session.ask(session.family.info, control=False))
 
 
 @click.command()
 @click.pass_obj
 def pose(session: Session) -> None:
     """Tell where tool and joints are, in mm and degrees."""
-    answer_pose(session, session.ask(Magician.get_pose, control=False))
+    answer(session, session.ask(session.family.pose, control=False))
 
 
 @click.command()
@@ -42,12 +36,13 @@ def pose(session: Session) -> None:
 @click.pass_obj
 def alarms(session: Session, clear: bool) -> None:
     """Tell the alarms, with cause and remedy."""
+    session.only(*(name for name, family in FAMILIES.items() if family.alarms))
 
-    async def question(arm: Magician) -> tuple[Alarm, ...]:
+    async def question(arm: Any) -> tuple[object, ...]:
         if clear:
             await arm.clear_alarms()
 
-        return await arm.get_alarms()
+        return tuple(await arm.get_alarms())
 
     found = session.ask(question, control=clear, queue="keep", on_error="leave")
     session.output.answer({"alarms": found}, "\n".join(map(str, found)) or "no alarms")
@@ -60,43 +55,52 @@ def home(session: Session) -> None:
 
     Needed after power-up; takes tens of seconds. What an earlier program left in the arm's queue is thrown away.
     """
-    move_and_answer(session, "homing", Magician.home)
+    move_and_answer(session, "homing", lambda arm: arm.home())
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
 @click.argument("x", type=float)
 @click.argument("y", type=float)
 @click.argument("z", type=float)
-@click.argument("r", type=float, default=0.0)
+@click.argument("rest", type=float, nargs=-1, metavar="[R]...")
 @click.option(
     "--mode",
-    type=click.Choice(list(MODES), case_sensitive=False),
-    default="movj",
-    show_default=True,
-    help="movj moves the joints, movl the tool along a straight line, jump lifts it. "
-    "-angle: the numbers are joint angles, -inc: increments.",
+    type=click.Choice(MODES, case_sensitive=False),
+    help="magician: movj moves the joints, movl the tool along a straight line, jump lifts it. -angle: the numbers are "
+    "joint angles, -inc: increments. ultraarm: to, by (increments) or joints (angles). "
+    "mycobot and its models: to, linear or joints.  [default: movj, to]",
 )
 @click.pass_obj
-def move(session: Session, x: float, y: float, z: float, r: float, mode: str) -> None:
+def move(session: Session, x: float, y: float, z: float, rest: tuple[float, ...], mode: str | None) -> None:
     """Move the tool to a point.
 
-    X Y Z are mm, R is degrees, 0 unless given. Ends when the arm is there. What an earlier program left in the
-    arm's queue is thrown away.
+    X Y Z are mm, R is degrees, 0 unless given; an ultraarm's is the fourth joint, which stays unless given. A
+    mycobot takes x y z rx ry rz, or one angle for each joint. Ends when the arm is there. What an earlier program
+    left in the arm's queue is thrown away.
     """
-    move_and_answer(session, "moving", lambda arm: arm.move_to(x, y, z, r, mode=MODES[mode]))
+    family = session.family
+    way = chosen(mode, family.modes, "--mode")
+    numbers = (x, y, z, *rest)
+    if len(numbers) > family.numbers:
+        raise click.UsageError(f"a move of this arm has at most {family.numbers} numbers, not {len(numbers)}")
+
+    move_and_answer(session, "moving", lambda arm: family.move(arm, numbers, way))
 
 
 @click.command()
-@click.argument("direction", type=click.Choice(list(DIRECTIONS), case_sensitive=False), metavar="DIRECTION")
+@click.argument("direction", type=click.Choice(DIRECTIONS, case_sensitive=False), metavar="DIRECTION")
 @click.argument("seconds", type=click.FloatRange(min=0))
 @click.pass_obj
 def jog(session: Session, direction: str, seconds: float) -> None:
     """Jog in a direction for a time.
 
-    DIRECTION is one of x+ x- y+ y- z+ z- r+ r-, j1+ j1- to j4-, rail+ rail-. What an earlier program left in the
-    arm's queue is thrown away.
+    DIRECTION is one of x+ x- y+ y- z+ z- r+ r-, j1+ j1- to j4-, rail+ rail- (an ultraarm has no r, j4 and rail; a
+    mycobot has j1 to j7 and rx, ry, rz, as far as its model goes). What an earlier program left in the arm's queue is
+    thrown away.
     """
-    move_and_answer(session, "jogging", lambda arm: arm.jog(DIRECTIONS[direction], seconds))
+    family = session.family
+    way = family.directions[chosen(direction, list(family.directions), "DIRECTION")]
+    move_and_answer(session, "jogging", lambda arm: family.jog(arm, way, seconds))
 
 
 @click.command()
@@ -108,7 +112,8 @@ def suction(session: Session, state: str) -> None:
     On sucks, off lets go and stops the pump. Takes effect at once; what is in the arm's queue goes on.
     """
     on = ON_OFF[state]
-    session.ask(lambda arm: arm.suction(on, pump=on), queue="keep", on_error="leave")
+    session.only(*(name for name, family in FAMILIES.items() if family.pump))
+    session.ask(lambda arm: session.family.suction(arm, on), queue="keep", on_error="leave")
     session.output.answer({"suction": on}, f"suction {state}")
 
 
@@ -116,26 +121,26 @@ def suction(session: Session, state: str) -> None:
 @click.pass_obj
 def stop(session: Session) -> None:
     """Stop the arm now, and empty its queue."""
-    session.ask(Magician.stop, queue="keep")
+    session.ask(lambda arm: arm.stop(), queue="keep")
     session.output.answer({"stopped": True}, "stopped")
 
 
 COMMANDS = (info, pose, alarms, home, move, jog, suction, stop)
 
 
-def move_and_answer(session: Session, what: str, motion: Callable[[Magician], Awaitable[None]]) -> None:
+def move_and_answer(session: Session, what: str, motion: Callable[[Any], Awaitable[None]]) -> None:
     """Waits for a motion, and answers with the pose in which it ended."""
 
-    async def question(arm: Magician) -> Pose:
+    async def question(arm: Any) -> Told:
         await motion(arm)
-        return await arm.get_pose()
+        return await session.family.pose(arm)
 
     with session.output.working(what):
         reached = session.ask(question)
 
-    answer_pose(session, reached)
+    answer(session, reached)
 
 
-def answer_pose(session: Session, found: Pose) -> None:
-    """Answers with a pose."""
-    session.output.answer(found, f"{tool_words(found)}  |  {joint_words(found)}")
+def answer(session: Session, told: Told) -> None:
+    """Answers with what an arm told."""
+    session.output.answer(told.value, told.text)

@@ -165,6 +165,7 @@ def demo(ctx: click.Context, cycles: int, speed: float | None, yes: bool) -> Non
     DOBOT_URL is not used here.
     """
     session: Session = ctx.obj
+    session.only("magician")
     assert ctx.parent
     # An arm that happens to be in the environment must not move because somebody wants to see a demo.
     given = ctx.parent.get_parameter_source("url") is ParameterSource.COMMANDLINE

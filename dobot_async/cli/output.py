@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
@@ -92,6 +92,22 @@ class Output:
             table = Table(show_header=False)
             for name, text in rows.items():
                 table.add_row(name, text)
+
+            live.update(table, refresh=True)
+
+        with Live(auto_refresh=False) as live:
+            yield draw
+
+    @contextmanager
+    def table(self, columns: Sequence[str]) -> Iterator[Callable[[Sequence[Sequence[str]]], None]]:
+        """Draws a table in place on a terminal, for the length of a block; yields what to draw its rows with."""
+        from rich.live import Live
+        from rich.table import Table
+
+        def draw(rows: Sequence[Sequence[str]]) -> None:
+            table = Table(*columns)
+            for row in rows:
+                table.add_row(*row)
 
             live.update(table, refresh=True)
 

@@ -20,7 +20,8 @@ from typing import Any, TextIO, TypeVar
 
 import click
 
-from dobot_async.cli.commands import MODES, ON_OFF
+from dobot_async.cli.commands import ON_OFF
+from dobot_async.cli.families import MODES
 from dobot_async.cli.session import Session
 from dobot_async.errors import DobotError
 from dobot_async.magician.arm import Magician
@@ -208,6 +209,7 @@ def run_program(session: Session, file: TextIO) -> None:
     FILE (- is standard input) has one verb a line, as in: move 200 0 50 mode=movl. All lines are checked before
     anything is sent. What an earlier program left in the arm's queue is thrown away. Ctrl-C stops the arm.
     """
+    session.only("magician")
     try:
         steps = parse(file)
     except UnicodeDecodeError as error:

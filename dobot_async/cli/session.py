@@ -1,6 +1,6 @@
 """One run of the command line: which arm, how it is reached, what signals do.
 
-    command --> Session.ask --> run (signals cancel it) --> Magician.connect --> question(arm) --> answer
+    command --> Session.ask --> run (signals cancel it) --> kind.connect --> question(arm) --> answer
 
 A signal cancels the work; the connection's block then stops the arm on its way out, however often the signal comes.
 """
@@ -16,18 +16,17 @@ from typing import Any, Literal, TypeVar
 
 import click
 
+from dobot_async.cli.families import FAMILIES, Family
 from dobot_async.cli.output import Output
 from dobot_async.cli.trace import Trace, tracing
 from dobot_async.link import Link
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.frame import Frame
 from dobot_async.transports import SCHEMES
 
 __all__ = ["ARMS", "Interrupted", "Session", "run"]
 
 T = TypeVar("T")
 
-ARMS = {"magician": Magician}
+ARMS = tuple(FAMILIES)
 """The families, by the words of `--arm`."""
 
 # A terminal that is closed must not leave an arm moving, either.
@@ -60,15 +59,25 @@ class Session:
     output: Output
     commanding: bool = False
 
+    @property
+    def family(self) -> Family:
+        """The arm's family."""
+        return FAMILIES[self.arm]
+
+    def only(self, *arms: str) -> None:
+        """Raises UsageError for a command that the arm's family does not have."""
+        if self.arm not in arms:
+            raise click.UsageError(f"this is for --arm {' or '.join(arms)} alone, not for {self.arm}")
+
     def ask(
         self,
-        question: Callable[[Magician], Awaitable[T]],
+        question: Callable[[Any], Awaitable[T]],
         *,
         control: bool = True,
         queue: Literal["fresh", "keep"] = "fresh",
         on_error: Literal["stop", "leave"] = "stop",
     ) -> T:
-        """Connects, as `Magician.connect` does, and returns what the arm answers to one question."""
+        """Connects, as the `connect` of its family does, and returns what the arm answers to one question."""
 
         async def asked() -> T:
             async with self.connect(control=control, queue=queue, on_error=on_error) as arm:
@@ -84,25 +93,25 @@ class Session:
         control: bool = True,
         queue: Literal["fresh", "keep"] = "fresh",
         on_error: Literal["stop", "leave"] = "stop",
-    ) -> AsyncIterator[Magician]:
+    ) -> AsyncIterator[Any]:
         """Connects to the session's arm, or to a URL, with the trace that was asked for."""
         url = url or self.url
         if not url:
             forms = "; ".join(form for _, form in SCHEMES.values())
             raise click.UsageError(f"which arm? Give --url or set DOBOT_URL, to one of: {forms}")
 
-        with tracing(self.trace) if self.trace else nullcontext() as trace:
-            kind = traced(trace) if trace else ARMS[self.arm]
+        with tracing(self.trace, self.family.describe) if self.trace else nullcontext() as trace:
+            kind = traced(self.family.kind, trace) if trace else self.family.kind
             async with kind.connect(url, control=control, queue=queue, on_error=on_error) as arm:
                 self.commanding = control and on_error == "stop"
                 yield arm
 
 
-def traced(trace: Trace) -> type[Magician]:
-    """Returns a Magician whose link tells a trace of every frame, those of the greeting included."""
+def traced(kind: Any, trace: Trace) -> Any:
+    """Returns a kind of arm whose link tells a trace of every frame, those of the greeting included."""
 
-    class Traced(Magician):
-        def __init__(self, link: Link[Frame], **options: Any) -> None:
+    class Traced(kind):  # type: ignore[misc]
+        def __init__(self, link: Link[Any], **options: Any) -> None:
             super().__init__(link, **options)
             link.trace = trace
 

@@ -11,25 +11,39 @@ from __future__ import annotations
 import asyncio
 import itertools
 import math
-import os
-from collections.abc import AsyncIterator, Awaitable, Callable
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from functools import partial
 from random import Random
-from typing import Any, cast
+from typing import Any, Protocol
 from urllib.parse import SplitResult, urlsplit
 from weakref import WeakValueDictionary
 
 import anyio
 
 from dobot_async.errors import ConnectFailed
+from dobot_async.mycobot.models import MODELS as COBOTS
 from dobot_async.simulator.faults import PROBABILITIES, TIMES, Channel, Faults
-from dobot_async.simulator.magician import Session, SimulatedMagician
+from dobot_async.simulator.magician import SimulatedMagician
+from dobot_async.simulator.mycobot import SimulatedMyCobot
+from dobot_async.simulator.ultraarm import SimulatedUltraArm
 from dobot_async.transports.base import MANY, Transport, options
+from dobot_async.transports.baud import AtBaud
+from dobot_async.transports.listen import on_tcp, on_udp
+from dobot_async.transports.terminal import on_pty
 
 __all__ = ["MODELS", "Simulation", "open_url", "simulate"]
 
-MODELS: dict[str, Callable[..., SimulatedMagician]] = {"magician": SimulatedMagician}
+MODELS: dict[str, Callable[..., Any]] = {
+    "magician": SimulatedMagician,
+    "mycobot": SimulatedMyCobot,
+    **{model: partial(SimulatedMyCobot, model=model) for model in COBOTS},
+    "ultraarm": SimulatedUltraArm,
+}
+"""The simulated arms by name: each is made with a clock, and has a `session()` for each client."""
+BLE_OPTIONS = {"name": str, "address": str, "interval": float, "mtu": int, "packets": int}
+PTY_OPTIONS = {"baud": int}
 FAULT_OPTIONS = dict.fromkeys((*PROBABILITIES, *TIMES), float)
 SILENCE = 1.0  # seconds after which a client that cannot be seen to leave counts as another one
 BUFFER = 1 << 16
@@ -40,6 +54,13 @@ running: WeakValueDictionary[str, Simulation] = WeakValueDictionary()
 """The simulations of this process, by the host of their `sim://` URLs."""
 
 
+class Session(Protocol):
+    """An arm's side of a connection."""
+
+    def receive(self, data: bytes) -> bytes:
+        """Takes bytes of requests, returns those of all replies to what is whole now."""
+
+
 class Simulation:
     """A simulated arm that can be reached.
 
@@ -47,17 +68,27 @@ class Simulation:
         url: What to connect to.
         arm: The arm: its pose, executed commands, alarms, inputs and outputs, counters.
         faults: What the line does to messages; may be changed at any time.
+        environment: What other programs need in their environment to reach it.
     """
 
-    def __init__(self, arm: SimulatedMagician, faults: Faults, seed: int | None) -> None:
+    def __init__(self, arm: Any, faults: Faults, seed: int | None) -> None:
         self.url = ""
         self.arm = arm
         self.faults = faults
+        self.environment: dict[str, str] = {}
         self._random = Random(seed)  # noqa: S311 - repeatable faults, no secrets
         self._clients: set[Client] = set()
         self._ended = False
 
-    def client(self, deliver: Callable[[bytes], None], hang_up: Callable[[], None], *, ordered: bool) -> Client:
+    def client(
+        self,
+        deliver: Callable[[bytes], None],
+        hang_up: Callable[[], None],
+        *,
+        ordered: bool,
+        hold: Callable[[bool], None] | None = None,  # noqa: ARG002 - an arm is never too slow for its line
+        name: str = "",  # noqa: ARG002
+    ) -> Client:
         """Called by an endpoint: somebody has connected, and takes replies by `deliver`."""
         client = Client(self.arm.session, self.faults, self._random, deliver, hang_up, ordered=ordered)
         self._clients.add(client)
@@ -138,8 +169,10 @@ async def simulate(
     """Runs a simulated arm for the length of a block.
 
     Args:
-        model: "magician".
-        listen: "memory" (this process only), "pty", "tcp://127.0.0.1:0" or "udp://127.0.0.1:0" (0: any free port).
+        model: "magician", "myarm300", "mycobot280" or another of that family, "ultraarm".
+        listen: "memory" (this process only), "pty" ("pty:?baud=115200" for a line as slow as the real one),
+            "tcp://127.0.0.1:0" or "udp://127.0.0.1:0" (0: any free port), or "ble" (Linux;
+            "ble:?interval=0.03&mtu=23&packets=4" says how good the connection is).
         speed: Simulated seconds per second.
         seed: Of the faults.
         faults: What the line does to messages.
@@ -148,6 +181,7 @@ async def simulate(
 
     Raises:
         ValueError: No such model, or no such place to listen at.
+        OSError: The place is taken, or dbus-daemon, which BLE needs, is not installed.
     """
     if model not in MODELS:
         raise ValueError(f"no simulator for {model!r}; there are: {', '.join(MODELS)}")
@@ -168,17 +202,52 @@ async def simulate(
 
 def endpoint(listen: str) -> Callable[[Simulation, AsyncExitStack], Awaitable[str]]:
     """What serves a place to listen at."""
-    local = {"memory": in_memory, "pty": on_pty}
-    if listen in local:
-        return local[listen]
+    if listen == "memory":
+        return in_memory
+
+    name = listen.partition(":")[0]
+    if name in LOCAL:
+        serve_locally, known = LOCAL[name]
+        place = urlsplit(listen)
+        if place.geturl() in {name, f"{name}:?{place.query}"}:
+            return partial(serve_locally, **options(place, known))
 
     with suppress(ValueError):
         place = urlsplit(listen)
-        serve = {"tcp": on_tcp, "udp": on_udp}.get(place.scheme)
+        sockets: dict[str, Callable[..., Awaitable[str]]] = {"tcp": on_tcp, "udp": on_udp}
+        serve = sockets.get(place.scheme)
         if serve and place.hostname and place.geturl() == f"{place.scheme}://{place.netloc}":
-            return partial(serve, host=place.hostname, port=place.port or 0)
+            return partial(serve, address=place.hostname, port=place.port or 0)
 
-    raise ValueError(f"cannot listen at {listen!r}; use memory, pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0")
+    raise ValueError(f"cannot listen at {listen!r}; use memory, pty, tcp://127.0.0.1:0, udp://127.0.0.1:0 or ble")
+
+
+async def on_ble(simulation: Simulation, stack: AsyncExitStack, **details: Any) -> str:
+    """A BLE module without a radio: clients on this computer find it on a D-Bus of its own."""
+    if sys.platform != "linux":
+        raise ValueError("ble is simulated by a BlueZ of its own, which only Linux can have")
+
+    from dobot_async.simulator import ble_rig  # noqa: PLC0415 - other systems have no D-Bus
+
+    return await ble_rig.serve(simulation, stack, **details)
+
+
+async def on_line(simulation: Simulation, stack: AsyncExitStack, *, baud: int | None = None) -> str:
+    """A pseudo-terminal, as fast as the computer or as slow as a serial line."""
+    if baud is None:
+        return await on_pty(simulation, stack)
+
+    if baud <= 0:
+        raise ValueError(f"baud must be above 0, not {baud}")
+
+    return await on_pty(AtBaud(simulation, baud), stack)
+
+
+LOCAL: dict[str, tuple[Callable[..., Awaitable[str]], Mapping[str, Callable[[str], Any]]]] = {
+    "pty": (on_line, PTY_OPTIONS),
+    "ble": (on_ble, BLE_OPTIONS),
+}
+"""Places on this computer that have no address: what serves them, and their options."""
 
 
 async def in_memory(simulation: Simulation, stack: AsyncExitStack) -> str:
@@ -187,36 +256,6 @@ async def in_memory(simulation: Simulation, stack: AsyncExitStack) -> str:
     running[name] = simulation
     stack.callback(running.pop, name, None)
     return f"sim://{name}"
-
-
-async def on_pty(simulation: Simulation, stack: AsyncExitStack) -> str:
-    """A serial port whose other end is the arm."""
-    port = PseudoTerminal(simulation)
-    stack.callback(port.close)
-    return f"serial://{port.path}"
-
-
-async def on_tcp(simulation: Simulation, stack: AsyncExitStack, *, host: str, port: int) -> str:
-    """A TCP port, as a serial server has it."""
-    loop = asyncio.get_running_loop()
-    server = await loop.create_server(lambda: Connection(simulation), host, port)
-    stack.push_async_callback(server.wait_closed)
-    stack.callback(server.close)
-    return address("tcp", server.sockets[0].getsockname())
-
-
-async def on_udp(simulation: Simulation, stack: AsyncExitStack, *, host: str, port: int) -> str:
-    """A UDP port, as the arm's Wi-Fi has it."""
-    loop = asyncio.get_running_loop()
-    transport, _ = await loop.create_datagram_endpoint(lambda: Datagrams(simulation), local_addr=(host, port))
-    stack.callback(transport.close)
-    return address("udp", transport.get_extra_info("sockname"))
-
-
-def address(scheme: str, name: tuple[Any, ...]) -> str:
-    """The URL of a socket."""
-    host, port = name[:2]
-    return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
 
 
 class MemoryTransport:
@@ -285,104 +324,3 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:
     async with AsyncExitStack() as stack:
         simulation = await stack.enter_async_context(simulate(arm, faults=faults, **given))
         return MemoryTransport(simulation, stack.pop_all())
-
-
-class PseudoTerminal:
-    """The arm's end of a pseudo-terminal. Its other end is kept open, so that clients may come and go."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
-        self._loop = asyncio.get_running_loop()
-        self._master, self._slave = os.openpty()
-        import tty  # noqa: PLC0415 - Windows has none, and needs none for the other endpoints
-
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.path = os.ttyname(self._slave)
-        self._unsent = bytearray()
-        self._client = simulation.client(self._deliver, self.close, ordered=True)
-        self._loop.add_reader(self._master, self._readable)
-
-    def close(self) -> None:
-        """Closes both ends; a client's port breaks."""
-        if self._master >= 0:
-            self._simulation.leave(self._client)
-            self._loop.remove_reader(self._master)
-            self._loop.remove_writer(self._master)
-            os.close(self._master)
-            os.close(self._slave)
-            self._master = -1
-
-    def _readable(self) -> None:
-        self._client.send(os.read(self._master, BUFFER))
-
-    def _deliver(self, data: bytes) -> None:
-        """Writes what fits; a client that never reads loses the rest, as a UART's does."""
-        if len(self._unsent) < BUFFER:
-            self._unsent += data
-            self._write()
-
-    def _write(self) -> None:
-        with suppress(BlockingIOError):
-            del self._unsent[: os.write(self._master, self._unsent)]
-
-        if self._unsent:
-            self._loop.add_writer(self._master, self._write)
-        else:
-            self._loop.remove_writer(self._master)
-
-
-class Connection(asyncio.Protocol):
-    """One TCP client."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """A client has connected."""
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
-        self._client = self._simulation.client(transport.write, transport.abort, ordered=True)
-
-    def data_received(self, data: bytes) -> None:
-        """It has sent something."""
-        self._client.send(data)
-
-    def pause_writing(self) -> None:
-        """It does not read; what it asks meanwhile waits in the line."""
-        self._transport.pause_reading()
-
-    def resume_writing(self) -> None:
-        """It reads again."""
-        self._transport.resume_reading()
-
-    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """It has gone."""
-        self._simulation.leave(self._client)
-
-
-class Datagrams(asyncio.DatagramProtocol):
-    """All UDP clients, each known by its address."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
-        self._clients: dict[Any, Client] = {}
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """The port is open."""
-        self._transport = cast(asyncio.DatagramTransport, transport)
-
-    def datagram_received(self, data: bytes, addr: Any) -> None:
-        """Somebody has sent something."""
-        if addr not in self._clients:
-            self._clients[addr] = self._simulation.client(
-                lambda reply: self._transport.sendto(reply, addr), lambda: self._forget(addr), ordered=False
-            )
-            if len(self._clients) > MANY:
-                self._forget(next(iter(self._clients)))
-
-        self._clients[addr].send(data)
-
-    def _forget(self, addr: Any) -> None:
-        """The next datagram from there comes from a new client."""
-        self._simulation.leave(self._clients.pop(addr))

@@ -19,7 +19,18 @@ from pathlib import Path
 HERE = Path(__file__).parent
 CORPUS = HERE / "corpus"
 BUILD = HERE.parents[1] / "build" / "fuzz"
-NAMES = ("parser", "layouts", "session", "alarms", "program")
+NAMES = (
+    "parser",
+    "layouts",
+    "session",
+    "alarms",
+    "program",
+    "mycobot_parser",
+    "mycobot_arm",
+    "ultraarm_answers",
+    "ultraarm_arm",
+    "ultraarm_gcode",
+)
 LONGEST = 2048
 ROUND = 500
 

@@ -9,6 +9,9 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
+from fuzz_mycobot import mycobot_arm, mycobot_parser
+from fuzz_ultraarm import ultraarm_answers, ultraarm_arm, ultraarm_gcode
+
 from dobot_async.cli.program import parse
 from dobot_async.errors import ProtocolError
 from dobot_async.magician import alarms
@@ -194,4 +197,9 @@ TARGETS: Mapping[str, Callable[[bytes], None]] = {
     "session": session,
     "alarms": alarm_bits,
     "program": program,
+    "mycobot_parser": mycobot_parser,
+    "mycobot_arm": mycobot_arm,
+    "ultraarm_answers": ultraarm_answers,
+    "ultraarm_arm": ultraarm_arm,
+    "ultraarm_gcode": ultraarm_gcode,
 }

@@ -752,7 +752,7 @@ async def test_a_simulation_that_has_ended_cannot_be_reached() -> None:
 # Bad arguments.
 
 
-@pytest.mark.parametrize("model", ["", "Magician", "mycobot"])
+@pytest.mark.parametrize("model", ["", "Magician", "mycobot380"])
 async def test_a_model_that_does_not_exist_is_named(model: str) -> None:
     with pytest.raises(ValueError, match=f"'{model}'.*magician"):
         await simulate(model).__aenter__()

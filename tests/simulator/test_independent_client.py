@@ -65,7 +65,8 @@ class Lab:
 
     def last(self) -> Executed:
         """What the arm has executed last."""
-        return self.arm.executed[-1]
+        executed: Executed = self.arm.executed[-1]
+        return executed
 
     def done(self, row: Command[Any, Any]) -> list[Any]:
         """The parameters of what the arm has executed of a row, in order."""
@@ -442,6 +443,7 @@ async def test_the_wireless_settings() -> None:
             await lab("write_command", number, params)
             assert (await lab("read_command", number)).params == params
 
+        await until(lambda: lab.arm.state.in_wifi)
         assert (await lab("read_command", CommandID.GET_WIFI_CONNECT_STATUS)).params == b"\x01"
         assert lab.arm.state.get(c.SET_WIFI_SSID) == "workshop"
 

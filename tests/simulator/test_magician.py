@@ -357,6 +357,23 @@ def test_wifi() -> None:
     bench.ask(c.SET_WIFI_SSID, "cell")
     assert not bench.ask(c.GET_WIFI_CONNECT_STATUS)
     bench.ask(c.SET_WIFI_CONFIG_MODE, value=False)
+    assert not bench.ask(c.GET_WIFI_CONNECT_STATUS)
+    bench.now += 2.0
+    assert bench.ask(c.GET_WIFI_CONNECT_STATUS)
+
+
+def test_wifi_needs_a_network_that_is_there_and_its_password() -> None:
+    bench = Bench()
+    bench.arm.state.networks = {"cell": "right"}
+    for ssid, password, connected in (("cell", "wrong", 0), ("other", "right", 0), ("cell", "right", 1)):
+        bench.ask(c.SET_WIFI_SSID, ssid)
+        bench.ask(c.SET_WIFI_PASSWORD, password)
+        bench.now += 2.0
+        assert bench.ask(c.GET_WIFI_CONNECT_STATUS) == connected
+
+    bench.arm.power_cycle()
+    assert not bench.ask(c.GET_WIFI_CONNECT_STATUS)
+    bench.now += 2.0
     assert bench.ask(c.GET_WIFI_CONNECT_STATUS)
 
 

@@ -1,0 +1,159 @@
+"""What the commands need to know of the myCobot family: an entry for each model, and "mycobot" for the 280."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass
+from typing import Any
+
+import click
+
+from dobot_async.cli.family import Family, Told
+from dobot_async.cli.output import plain
+from dobot_async.errors import ProtocolError
+from dobot_async.mycobot import commands as c
+from dobot_async.mycobot.alarms import CobotAlarm
+from dobot_async.mycobot.arm import MyCobot
+from dobot_async.mycobot.frame import Frame
+from dobot_async.mycobot.models import AXES, MODELS, CobotModel
+from dobot_async.mycobot.readings import CobotPose
+
+__all__ = ["COBOTS"]
+
+DEFAULT = "mycobot280"
+WAYS = {"to": c.MoveMode.ANGULAR, "linear": c.MoveMode.LINEAR}
+JOINTS = "joints"
+
+
+@dataclass(frozen=True, slots=True)
+class CobotReading:
+    """What an arm told at one time.
+
+    Attributes:
+        time: Seconds since 1970.
+        pose: Where it is.
+        alarms: What is wrong.
+        moving: Whether it moves.
+    """
+
+    time: float
+    pose: CobotPose
+    alarms: tuple[CobotAlarm, ...]
+    moving: bool
+
+    @property
+    def rows(self) -> dict[str, str]:
+        """What a person wants to see of it."""
+        return {
+            "tool": tool_words(self.pose),
+            "joints": joint_words(self.pose),
+            "state": "moving" if self.moving else "at rest",
+            "alarms": ", ".join(alarm.name for alarm in self.alarms) or "none",
+        }
+
+
+def tool_words(pose: CobotPose) -> str:
+    """Where the tool is, mm and degrees."""
+    return "  ".join(f"{axis} {getattr(pose, axis):7.2f}" for axis in AXES)
+
+
+def joint_words(pose: CobotPose) -> str:
+    """The joints, degrees."""
+    return "  ".join(f"j{number} {angle:7.2f}" for number, angle in enumerate(pose.joints, 1))
+
+
+async def info(arm: MyCobot) -> Told:
+    """The model, and the versions of its firmware."""
+    found = await arm.get_info()
+    versions = [each or "unknown" for each in (found.system_version, found.basic_version)]
+    return Told(found, f"model          {found.model}\nfirmware       {versions[0]}\nM5             {versions[1]}")
+
+
+async def pose(arm: MyCobot) -> Told:
+    """Tool and joints."""
+    found = await arm.get_pose()
+    return Told(found, f"{tool_words(found)}  |  {joint_words(found)}")
+
+
+async def read(arm: MyCobot) -> CobotReading:
+    """Asks an arm for everything."""
+    return CobotReading(time.time(), await arm.get_pose(), await arm.get_alarms(), await arm.is_moving())
+
+
+async def move(arm: MyCobot, numbers: Sequence[float], mode: str) -> None:
+    """One number for each joint, or each coordinate."""
+    if mode == JOINTS:
+        await arm.move_joints(*numbers)
+    else:
+        x, y, z, *rotation = numbers
+        await arm.move_to(x, y, z, *rotation, mode=WAYS[mode])
+
+
+async def jog(arm: MyCobot, direction: str, seconds: float) -> None:
+    """Jogs."""
+    await arm.jog(direction, seconds)
+
+
+async def suction(arm: MyCobot, on: bool) -> None:  # noqa: ARG001
+    """There is no pump."""
+    raise click.UsageError("this arm has no pump of its own")
+
+
+def describe(model: CobotModel) -> Callable[..., Mapping[str, Any]]:
+    """What a trace says of this model's frames."""
+
+    def described(frame: Frame, *, outgoing: bool) -> dict[str, Any]:
+        row = model.row(model.by_id[frame.id])
+        line = {
+            "time": time.time(),
+            "direction": "out" if outgoing else "in",
+            "command": row.name,
+            "value": None,
+            "raw": bytes(frame).hex(" "),
+        }
+        try:
+            line["value"] = plain((row.request if outgoing else row.reply).decode(frame.params))
+        except ProtocolError as error:
+            line["problem"] = str(error)
+
+        return line
+
+    return described
+
+
+def of_model(name: str) -> type[MyCobot]:
+    """The class that connects to this model without being told which."""
+
+    class Model(MyCobot):
+        @classmethod
+        def connect(cls, url: str, **options: Any) -> AbstractAsyncContextManager[Any]:  # type: ignore[override]
+            return super().connect(url, **{"model": name, **options})
+
+    return Model
+
+
+def family(name: str) -> Family:
+    """The entry of a model."""
+    model = MODELS[name]
+    words = [f"j{joint}" for joint in range(1, model.joints + 1)] + list(AXES[: len(model.reach)])
+    return Family(
+        kind=of_model(name),
+        info=info,
+        pose=pose,
+        read=read,
+        move=move,
+        modes=("to", "linear", JOINTS),
+        jog=jog,
+        directions={f"{word}{way}": f"{word}{way}" for word in words for way in "+-"},
+        suction=suction,
+        describe=describe(model),
+        numbers=max(model.joints, len(model.reach)),
+        alarms=True,
+        pump=False,
+    )
+
+
+COBOTS = {"mycobot": family(DEFAULT), **{name: family(name) for name in MODELS}}
+"""The entries, by the words of `--arm`."""

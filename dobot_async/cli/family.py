@@ -1,0 +1,60 @@
+"""What a family of arms is to the commands."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+__all__ = ["Family", "Reading", "Told"]
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """An answer: as JSON, and in words."""
+
+    value: Any
+    text: str
+
+
+class Reading(Protocol):
+    """What an arm told at one time."""
+
+    @property
+    def rows(self) -> Mapping[str, str]:
+        """What a person wants to see of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """One family of arms.
+
+    Attributes:
+        kind: Its class, with `connect`, `home` and `stop`.
+        info: Tells who an arm is.
+        pose: Tells where it is.
+        read: Tells all that `monitor` shows.
+        move: Moves to numbers, in one of the `modes`.
+        modes: The ways to move, the usual one first.
+        jog: Jogs in one of the `directions`, for so many seconds.
+        directions: What a jog can be called.
+        suction: Switches the pump.
+        describe: Says what a trace says of a frame.
+        numbers: How many numbers a move has at most.
+        alarms: Whether it has `get_alarms` and `clear_alarms`.
+        pump: Whether it has one.
+    """
+
+    kind: Any
+    info: Callable[[Any], Awaitable[Told]]
+    pose: Callable[[Any], Awaitable[Told]]
+    read: Callable[[Any], Awaitable[Reading]]
+    move: Callable[[Any, Sequence[float], str], Awaitable[None]]
+    modes: Sequence[str]
+    jog: Callable[[Any, Any, float], Awaitable[None]]
+    directions: Mapping[str, Any]
+    suction: Callable[[Any, bool], Awaitable[None]]
+    describe: Callable[..., Mapping[str, Any]]
+    numbers: int = 4
+    alarms: bool = False
+    pump: bool = True

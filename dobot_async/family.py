@@ -1,0 +1,83 @@
+"""What the arms of all families do alike with their queue of motions, beside the queue itself."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any, TypeVar
+
+from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTimeout
+from dobot_async.executor import Entry
+from dobot_async.motion import Motion, MotionQueue, undisturbed
+from dobot_async.transports import Transport, open_transport
+from dobot_async.wire import Command
+
+__all__ = ["Collector", "collected", "open_in_time", "owned"]
+
+Q = TypeVar("Q")
+C = TypeVar("C", bound="Collector")
+
+
+async def owned(queue: MotionQueue, command: Command[Q, Any], value: Q, timeout: float | None) -> None:
+    """Queues a motion and waits for its end; it does not outlive the call: cancelled, or too late, the arm stops.
+
+    Raises:
+        ReplyTimeout: It was not done in time; the arm was stopped.
+        DobotError: As `MotionQueue.put` and `Motion.wait`.
+    """
+    queue.prepare(command, value)
+    try:
+        async with asyncio.timeout(timeout):
+            motion = await queue.put(command, value)
+            await motion
+    except (TimeoutError, asyncio.CancelledError) as error:
+        await undisturbed(queue.stop())
+        if isinstance(error, TimeoutError) and not isinstance(error, DobotError):
+            raise ReplyTimeout(f"{command.name} was not done within {timeout:.3g} s; the arm was stopped") from None
+
+        raise
+
+
+class Collector:
+    """Commands that are to be queued together; each one's Motion may be awaited after the batch's block."""
+
+    def __init__(self, queue: MotionQueue) -> None:
+        self.motions: dict[Entry, Motion] = {}
+        self._queue = queue
+
+    def put(self, command: Command[Q, Any], value: Q) -> Motion:
+        """Adds any row of the table that may be queued."""
+        entry = self._queue.prepare(command, value)
+        motion = self.motions[entry] = Motion(self._queue, entry)
+        return motion
+
+    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Motion:
+        """Adds a command."""
+        if timeout is not None:
+            raise ValueError("the commands of a batch have no timeout of their own; give it to batch()")
+
+        return self.put(command, value)
+
+
+@asynccontextmanager
+async def collected(queue: MotionQueue, batch: C, timeout: float | None) -> AsyncIterator[C]:
+    """Queues what the block collects, with nothing between it, when the block ends; an error sends none."""
+    try:
+        yield batch
+    except BaseException:
+        for motion in batch.motions.values():
+            motion.end(MotionStopped("it was not sent: its batch was left by an error"))
+
+        raise
+
+    await queue.put_all(batch.motions, timeout=timeout)
+
+
+async def open_in_time(url: str, arm: str, timeout: float) -> Transport:
+    """Opens the way to an arm; raises ConnectFailed if that takes too long."""
+    try:
+        async with asyncio.timeout(timeout):
+            return await open_transport(url, arm=arm)
+    except TimeoutError:
+        raise ConnectFailed(f"{url} could not be opened within {timeout:.3g} s; is the address right?") from None

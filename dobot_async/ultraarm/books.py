@@ -1,0 +1,158 @@
+"""The books of an ultraArm's queue: what was given to it, and what of that QUEUE SIZE proves done. No I/O.
+
+    given   G0  G0  M23  G0  G0  |          QUEUE SIZE[1]: one waits, one more may be executing,
+            done    done  `-- open          so that the last two motions, and what is behind them, are open
+
+The arm has no indices, so a ticket is our own count. Whether a setting takes room in the arm's queue is not known; only
+motions are counted, which proves less than it could and never too much.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from dobot_async.executor import Entry
+from dobot_async.ultraarm import commands as c
+from dobot_async.wire import Command
+
+__all__ = ["MODES", "Books", "Given", "Target", "target_of"]
+
+AXES: Mapping[type, tuple[bool, Mapping[str, str]]] = MappingProxyType(
+    {
+        c.CoordsMove: (False, {name: name for name in ("x", "y", "z", "e")}),
+        c.JointsMove: (True, {name: name for name in ("j1", "j2", "j3", "j4")}),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where an absolute motion leads: some of the coordinates, or of the joints."""
+
+    joints: bool
+    numbers: Mapping[str, float]
+
+    def miss(self, here: c.UltraArmCoords | c.UltraArmAngles) -> float:
+        """Returns the greatest distance of an axis from the target, mm or degrees."""
+        return max((abs(getattr(here, name) - value) for name, value in self.numbers.items()), default=0.0)
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {value:g}" for name, value in self.numbers.items())
+
+
+def target_of(entry: Entry, *, relative: bool = False) -> Target | None:
+    """Returns where a command leads, None if that depends on where the arm will be, or if it leads nowhere."""
+    value: Any = entry.value
+    if entry.command is c.MOVE_BY or (relative and entry.command is c.MOVE_COORDS):
+        return None
+
+    if isinstance(value, c.JointMove):
+        return Target(joints=True, numbers={f"j{value.joint}": value.angle})
+
+    if type(value) not in AXES or not entry.command.moves:
+        return None
+
+    joints, names = AXES[type(value)]
+    found = {name: getattr(value, field) for name, field in names.items()}
+    return Target(joints, {name: number for name, number in found.items() if number is not None})
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A command that the arm has taken."""
+
+    ticket: int
+    entry: Entry
+
+
+class Books:
+    """See the module.
+
+    Attributes:
+        open: What is not known to be done, in order.
+        taken: The ticket of the last command; 0 before it.
+        completed: The ticket of the last command that is known to be done; 0 before it.
+        target: Where the arm stands once all is done, if the last motion tells.
+        verified: Whether it was seen to stand there.
+        relative: Whether coordinates are increments once all is done.
+    """
+
+    def __init__(self) -> None:
+        self.open: deque[Given] = deque()
+        self.completed = 0
+        self.target: Target | None = None
+        self.verified = False
+        self.relative = False
+        self.taken = 0
+
+    def take(self, entry: Entry) -> int:
+        """Enters a command that the arm has taken; returns its ticket."""
+        self.taken += 1
+        self.open.append(Given(self.taken, entry))
+        if entry.command.moves:
+            self.target, self.verified = target_of(entry, relative=self.relative), False
+
+        return self.taken
+
+    def waiting(self, size: int) -> int:
+        """So many commands wait in the arm's queue; returns the ticket of the last that is done."""
+        motions = 0
+        undone = len(self.open)
+        for given in reversed(self.open):
+            undone -= 1
+            motions += given.entry.command.moves
+            if motions > size:
+                break
+        else:
+            undone = 0
+
+        for _ in range(undone):
+            self.completed = self.open.popleft().ticket
+
+        return self.completed
+
+    def all_done(self) -> int:
+        """The arm rests, and nothing waits; returns the ticket of the last command."""
+        self.open.clear()
+        self.completed = self.taken
+        self.verified = True
+        return self.completed
+
+    @property
+    def dwell(self) -> float:
+        """Seconds that the arm is told to wait behind the last open motion: it may look idle meanwhile."""
+        seconds = 0.0
+        for given in reversed(self.open):
+            if given.entry.command.moves:
+                break
+
+            if given.entry.command is c.WAIT:
+                seconds += given.entry.value.seconds
+
+        return seconds
+
+    @property
+    def unfinished_mode(self) -> bool:
+        """Whether an open command changes what coordinates mean."""
+        return any(given.entry.command in MODES or given.entry.command is c.MOVE_BY for given in self.open)
+
+    def note(self, command: Command[Any, Any]) -> None:
+        """The arm has taken a command; notes what it means for the others."""
+        self.relative = MODES.get(command, self.relative)
+        if command in FORGETTING:
+            self.target = None
+
+    def forget(self) -> None:
+        """Nothing is open any more."""
+        self.open.clear()
+        self.completed = self.taken
+        self.target = None
+
+
+MODES: Mapping[Command[Any, Any], bool] = MappingProxyType({c.ABSOLUTE: False, c.RELATIVE: True})
+FORGETTING = {c.JOG_JOINT, c.JOG_COORD, c.RELEASE, c.CALIBRATE_J1, c.SET_POSITION}
+"""After these the arm stands elsewhere than the last motion led, or calls it otherwise."""

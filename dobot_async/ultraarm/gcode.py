@@ -1,0 +1,294 @@
+"""G-code programs: read and checked as a whole before anything is sent, then streamed through the arm's queue.
+
+    ; a comment                    (another one)
+    G90
+    G1 X200 Y0 Z40 F100            G1 is sent as G0: the arm has one kind of motion
+    X210                           a line of axes alone goes on with the motion before it, at its F
+    M3
+    M30                            ends the program, as M2 does
+
+Line numbers (N10) and checksums (*71) count for nothing, nor do G17, G21, G40, G49, G80 and G94, which say what is so
+anyway. F is mm/s, as the arm has it, not mm/min. What the arm has no command for is an error, and so is what asks it
+something. A program begins in absolute coordinates, and leaves the arm in them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+from collections.abc import AsyncIterator, Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from dobot_async.errors import DobotError, ProtocolError
+from dobot_async.motion import Motion, MotionQueue, undisturbed
+from dobot_async.ultraarm import commands as c
+from dobot_async.ultraarm.frame import split_words
+from dobot_async.ultraarm.layouts import Words
+from dobot_async.wire import Command, Queueing
+
+__all__ = ["GCodeLine", "GCodeRun", "Source", "parse_gcode"]
+
+Source = str | os.PathLike[str] | Iterable[str]
+COMMENT = re.compile(r"\([^)]*\)|;.*|%|\*\d+\s*$")
+EXPONENT = re.compile(r"\de[-+]?\d")
+IGNORED = {"G17", "G21", "G40", "G49", "G80", "G94"}
+ENDING = {"M2", "M30"}
+AXES = ("x", "y", "z", "e")
+MOVING = "XYZEF"
+
+
+@dataclass(frozen=True, slots=True)
+class GCodeLine:
+    """One command of a program, checked.
+
+    Attributes:
+        number: Of its line, from 1; 0 for what the program did not ask for itself.
+        text: Of its line.
+        command: The row of the table.
+        value: Its parameters.
+    """
+
+    number: int
+    text: str
+    command: Command[Any, Any]
+    value: Any
+
+    def __str__(self) -> str:
+        return f"line {self.number} ({self.text})"
+
+
+def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> tuple[GCodeLine, ...]:
+    """Returns a program's commands; does no more than to read the file.
+
+    Args:
+        source: A file's path, or lines.
+        limits: What the arm may be told. Increments are looked at where it is known from where.
+
+    Raises:
+        ValueError: Lines are wrong; the message has each with its number.
+        OSError: The file cannot be read.
+    """
+    reader = Reader(limits)
+    found: list[GCodeLine] = []
+    wrong = []
+    for number, written in enumerate(lines_of(source), 1):
+        text = COMMENT.sub(" ", written).strip()
+        try:
+            for command, value in reader.read(text):
+                found.append(GCodeLine(number, written.strip(), command, value))
+        except (ValueError, TypeError, ProtocolError) as error:
+            wrong.append(f"line {number}: {error}")
+
+        if reader.ended:
+            break
+
+    if wrong:
+        raise ValueError("\n".join(wrong))
+
+    return tuple(found)
+
+
+def lines_of(source: Source) -> Iterable[str]:
+    """The lines of a program."""
+    if isinstance(source, (str, os.PathLike)):
+        return Path(source).read_text(encoding="utf-8-sig").splitlines()
+
+    return source
+
+
+class Reader:
+    """What the lines so far mean for the next one.
+
+    Attributes:
+        ended: Whether the program has said that it ends.
+    """
+
+    def __init__(self, limits: c.UltraArmLimits) -> None:
+        self.ended = False
+        self._limits = limits
+        self._relative = False
+        self._moves = False
+        self._speed: float | None = None
+        self._here: dict[str, float | None] = dict.fromkeys(AXES)
+
+    def read(self, text: str) -> Iterator[tuple[Command[Any, Any], Any]]:
+        """Yields the commands of a line, each with its parameters."""
+        if not text:
+            return
+
+        for name, letters in self._groups(text):
+            if name in IGNORED:
+                continue
+
+            if name in ENDING:
+                self.ended = True
+                return
+
+            command = row_of(name)
+            value = command.request.decode("".join(letters).encode("ascii"))
+            if isinstance(value, c.CoordsMove) and all(getattr(value, axis) is None for axis in AXES):
+                self._speed = value.f
+                continue
+
+            value = self._checked(command, value)
+            self._moves = self._moves or command is c.MOVE_COORDS
+            yield command, value
+
+    def _groups(self, text: str) -> Iterator[tuple[str, list[str]]]:
+        """The words of a line, each command with its own."""
+        if EXPONENT.search(text):
+            raise ValueError(f"{text!r} has an exponent, which the arm would read as its fourth axis")
+
+        try:
+            words = split_words(text.encode("ascii"))
+        except ValueError:
+            raise ValueError(f"{text!r} is no G-code") from None
+
+        groups: list[tuple[str, list[str]]] = []
+        for letter, number in words:
+            if letter == "N" and not groups:
+                continue
+
+            if letter in "GM" and not (groups and letter in letters_of(groups[-1][0])):
+                groups.append((f"{letter}{int(number)}" if number.isdigit() else letter + number, []))
+            elif groups:
+                groups[-1][1].append(letter + number)
+            elif letter in MOVING and self._moves:
+                groups.append(("G0", [letter + number]))
+            else:
+                raise ValueError(f"{letter}{number} belongs to no command")
+
+        yield from groups
+
+    def _checked(self, command: Command[Any, Any], value: Any) -> Any:
+        """The parameters with the speed that still holds; raises ValueError where the arm could not take them."""
+        if isinstance(value, (c.CoordsMove, c.JointMove, c.JointsMove)):
+            self._speed = self._speed if value.f is None else value.f
+            value = replace(value, f=self._speed)
+
+        command.request.encode(value)
+        if command is c.MOVE_COORDS:
+            self._move(value)
+        else:
+            self._limits.check(value)
+            self._relative = {c.ABSOLUTE: False, c.RELATIVE: True}.get(command, self._relative)
+            if command is c.SET_POSITION:
+                self._here |= {axis: at for axis in AXES if (at := getattr(value, axis)) is not None}
+            elif command.moves or command is c.RELEASE:
+                self._here = dict.fromkeys(AXES)
+
+        return value
+
+    def _move(self, value: c.CoordsMove) -> None:
+        """Goes along with a motion, as far as it is known where it begins."""
+        there = dict(self._here)
+        for axis in AXES:
+            given, at = getattr(value, axis), self._here[axis]
+            if given is not None:
+                there[axis] = given if not self._relative else None if at is None else at + given
+
+        self._limits.check(c.CoordsMove(**there))
+        self._here = there
+
+
+def row_of(name: str) -> Command[Any, Any]:
+    """The row of a word; raises ValueError where a program cannot have it."""
+    command = c.BY_WORD.get("G0" if name == "G1" else name)
+    if command is None:
+        raise ValueError(f"the arm has no command {name}")
+
+    if command.queueing is Queueing.NEVER:
+        raise ValueError(f"{name} is no command for a program")
+
+    return command
+
+
+def letters_of(name: str) -> str:
+    """The letters that may stand behind a word."""
+    request = c.BY_WORD[name].request if name in c.BY_WORD else None
+    return "".join(field.letter.letter for field in request.fields) if isinstance(request, Words) else ""
+
+
+class GCodeRun:
+    """A program that is checked, and sent when this is awaited or iterated over; it yields each line that is done.
+
+    It belongs to who awaits it: a cancellation stops the arm. A line that fails is named in a note of the error.
+
+    Attributes:
+        lines: Its commands.
+    """
+
+    def __init__(
+        self,
+        queue: MotionQueue,
+        lines: Sequence[GCodeLine],
+        *,
+        send: bool = True,
+        constant_speed: bool = False,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        before = [GCodeLine(0, "G90", c.ABSOLUTE, None)]
+        after = [GCodeLine(0, "G90", c.ABSOLUTE, None)] if ends_relative(lines) else []
+        if constant_speed:
+            before.append(GCodeLine(0, "M16 S0", c.SET_SPEED_MODE, c.ModeOfSpeed(c.SpeedMode.CONSTANT)))
+            after.append(GCodeLine(0, "M16 S2", c.SET_SPEED_MODE, c.ModeOfSpeed(c.SpeedMode.RAMPED)))
+
+        self.lines = tuple(lines)
+        self._queue = queue
+        self._todo = [*before, *lines, *after] if send and lines else []
+        self._progress = progress
+
+    def __await__(self) -> Generator[Any, None, None]:
+        return self._run().__await__()
+
+    async def __aiter__(self) -> AsyncIterator[GCodeLine]:
+        motions: list[Motion] = []
+        done = count = 0
+        try:
+            with self._queue.watching():
+                for step in [*self._todo, None]:
+                    if step:
+                        motions.append(await self._queue.put(step.command, step.value))
+
+                    while done < len(motions) and (step is None or motions[done].done):
+                        await motions[done]
+                        line = self._todo[done]
+                        done += 1
+                        if line.number:
+                            count += 1
+                            self._report(count)
+                            yield line
+        except (asyncio.CancelledError, GeneratorExit):
+            await undisturbed(self._queue.stop())
+            raise
+        except DobotError as error:
+            error.add_note(str(await self._failed(motions)))
+            raise
+
+    async def _run(self) -> None:
+        async for _ in self:
+            pass
+
+    def _report(self, done: int) -> None:
+        if self._progress:
+            self._progress(done, len(self.lines))
+
+    async def _failed(self, motions: Sequence[Motion]) -> GCodeLine:
+        """The first line that is known to have failed; if there is none, the one that was to be sent next."""
+        for line, motion in zip(self._todo, motions, strict=False):
+            if motion.done:
+                try:
+                    await motion
+                except DobotError:
+                    return line
+
+        return self._todo[min(len(motions), len(self._todo) - 1)]
+
+
+def ends_relative(lines: Sequence[GCodeLine]) -> bool:
+    """Whether increments are what coordinates mean at the end."""
+    modes = [line.command for line in lines if line.command in {c.ABSOLUTE, c.RELATIVE}]
+    return bool(modes) and modes[-1] is c.RELATIVE
