@@ -15,6 +15,9 @@ of a lost one and its request is sent again, at once. What is owed ends
   each line one reply may yet be a straggler, that came to be late alone: it is recognised for `linger` seconds;
 - `linger` seconds after its request; a peer that has just shown that it pauses for longer is given twice as long.
 
+Where a straggler may come, a call can `hold` its replies until something that was asked behind it is answered: one by
+then is the right one, of two nothing tells which is.
+
 So any number of replies may be late together, as when the peer pauses, and one of each key alone, and still none
 answers a later request. On a link with `disorder` "later" means later by that much, and a reply so close behind another
 of its key that it may be a second copy answers nobody.
