@@ -448,6 +448,9 @@ class Link(Generic[F]):
 
     async def _turn(self, key: Hashable, rank: int, timeout: float, what: str) -> None:
         """Waits for the turn of a request, no longer than its own timeout."""
+        if self._turns.take_now(key):
+            return
+
         try:
             async with asyncio.timeout(timeout):
                 await self._turns.take(key, rank)

@@ -157,6 +157,9 @@ class Pending(Generic[F]):
 
     def owed(self, key: Hashable, *, but: Waiter[F] | None = None) -> float | None:
         """When the last request of a key, but for one call's, was sent whose reply may still come in its turn."""
+        if key not in self._lines:
+            return None
+
         now = self.clock()
         return max((sent.at for sent in self.line(key) if sent.passed > now and sent.waiter is not but), default=None)
 
@@ -217,7 +220,9 @@ class Pending(Generic[F]):
 
     def _find(self, line: list[Sent[F]], frame: F, now: float, *, doubled: bool) -> tuple[int, Any] | None:
         """Returns whose place in the line a frame fits, and what it means."""
-        excused = any(sent.waiter.deliver and (sent.waiter.lenient or sent.waiter.held is not None) for sent in line)
+        excused = len(line) > 1 and any(
+            sent.waiter.deliver and (sent.waiter.lenient or sent.waiter.held is not None) for sent in line
+        )
         for place, sent in enumerate(line):
             waiter = sent.waiter
             if waiter.tombstone and (doubled or (excused and sent.passed <= now and not waiter.deliver)):

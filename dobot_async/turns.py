@@ -29,10 +29,17 @@ class Turns:
         self._waiting: list[Turn] = []
         self._number = 0
 
+    def take_now(self, key: Hashable) -> bool:
+        """Takes a turn if it is this request's at once: nobody who waits could go instead."""
+        if not self._may(key):
+            return False
+
+        self._grant(key)
+        return True
+
     async def take(self, key: Hashable, rank: int) -> None:
         """Returns when it is this request's turn; a key of None excludes nobody."""
-        if self._may(key):  # nobody who waits could go instead: `give` has let go on who can
-            self._grant(key)
+        if self.take_now(key):
             return
 
         self._number += 1

@@ -77,7 +77,10 @@ class SerialTransport(asyncio.Protocol):
     async def send(self, data: bytes) -> None:
         """Writes one frame; waits while the output is full."""
         self._check()
-        self._transport.write(data)
+        rest = self._written(data)
+        if rest:
+            self._transport.write(rest)
+
         if not self._writable.is_set():
             await self._writable.wait()
             self._check()
@@ -133,6 +136,20 @@ class SerialTransport(asyncio.Protocol):
     def resume_writing(self) -> None:
         """The output has room again."""
         self._writable.set()
+
+    def _written(self, data: bytes) -> bytes:
+        """Writes what the port takes at once, and returns the rest.
+
+        pyserial-asyncio would have the loop ask the system first whether the port takes it: that costs more than the
+        rest of a request together.
+        """
+        if os.name != "posix" or self._transport.get_write_buffer_size():
+            return data
+
+        try:
+            return data[os.write(self._transport.serial.fd, data) :]
+        except OSError:
+            return data  # whatever it is, the transport finds it as well, and ends for it
 
     def _wake(self) -> None:
         if self._arrived and not self._arrived.done():
