@@ -319,7 +319,7 @@ class MagicianExecutor:
                 self._books, self._summed_from = Books(index), index
                 if cleared and not attempt:
                     self._cleared = self._summed_from = index - 1
-                elif attempt:
+                else:
                     await self._confirm(index)
 
                 return True
