@@ -40,6 +40,7 @@ Q = TypeVar("Q")
 IMMEDIATE_RANK, QUEUED_RANK = 0, 1
 CLOSE_TIMEOUT = 2.0
 LEAST_PATIENCE = 0.001  # seconds; nobody answers a request for which less is left
+BREAK = 0.005  # seconds without a byte in the middle of a frame, after which the rest of it does not come
 FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0
 BROKEN = (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceError, OSError)
 MUTE = 3
@@ -87,6 +88,7 @@ class Link(Generic[F]):
         self._filler = filler
         self._fences = fences
         self._unanswered = 0
+        self._arrived_at = -math.inf
         self._read_only = read_only
         self._stats = LinkStats()
         self._loop = asyncio.get_running_loop()
@@ -219,7 +221,8 @@ class Link(Generic[F]):
     ) -> Posted[R]:
         """Sends the frame of a queued command; its answer is awaited with the `Posted` that is returned.
 
-        Several may be under way. `accept` knows a late answer by its index, so none needs a tombstone.
+        Several may be under way, as many as the family says. `accept` knows a late answer by its index, so none needs a
+        tombstone.
 
         Args:
             frame: What `frame` made of the command.
@@ -230,10 +233,14 @@ class Link(Generic[F]):
             leaving: Called when it goes out: from now on the arm may have it.
         """
         self._check()
-        await self._turn(None, QUEUED_RANK, timeout, name)
+        alone = self._transport.in_flight == 1
+        if alone:
+            await self._turn(None, QUEUED_RANK, timeout, name)
+
         leaving()
         waiter = self._pending.expect(frame.key, accept, tombstone=tombstone)
-        posted: Posted[R] = Posted(self, name, waiter, self._round_trip, partial(self._turns.give, None))
+        give_turn = partial(self._turns.give, None) if alone else None
+        posted: Posted[R] = Posted(self, name, waiter, self._round_trip, give_turn)
         try:
             waiter.sent()
             self._stats.sent += 1
@@ -356,7 +363,7 @@ class Link(Generic[F]):
             async with asyncio.timeout(seconds):
                 await self.opened()
                 if owed is not None:
-                    await self._fence(key, owed)
+                    waiter.fenced = await self._fence(key, owed)
 
                 if not urgent:
                     await self._calm(key)
@@ -365,11 +372,11 @@ class Link(Generic[F]):
 
         return False
 
-    async def _fence(self, key: Hashable, owed: float) -> None:
-        """Asks something else if answers of this key are owed: what is not there when that is answered was lost."""
+    async def _fence(self, key: Hashable, owed: float) -> bool:
+        """Asks something else, if it can: what is owed and not there when that is answered was lost."""
         frame = self._other(key)
         if frame is None:
-            return
+            return False
 
         await self._calm(frame.key)
         if self.disorder:
@@ -386,6 +393,7 @@ class Link(Generic[F]):
                     await answered
 
         await asyncio.sleep(self.disorder)
+        return True
 
     async def _calm(self, key: Hashable) -> None:
         """Returns when no second answer to a request of this key can arrive: it would pass for the next one's."""
@@ -396,7 +404,7 @@ class Link(Generic[F]):
         """Returns where the next answer arrives; it may do so at once, out of what an incomplete frame held back."""
         reply: asyncio.Future[Any] = self._loop.create_future()
         waiter.listen(partial(deliver, reply))
-        if resync:
+        if resync and self._loop.time() > self._arrived_at + BREAK:
             self._receive(self._parser.resync())
 
         return reply
@@ -486,7 +494,9 @@ class Link(Generic[F]):
         try:
             while True:
                 try:
-                    self._receive(self._parser.feed(await self._transport.receive()))
+                    data = await self._transport.receive()
+                    self._arrived_at = self._loop.time()
+                    self._receive(self._parser.feed(data))
                 except BROKEN as error:
                     if not self._reopen:
                         self._end(LinkState.LOST, error.__cause__ or error)

@@ -140,8 +140,10 @@ class Pending(Generic[F]):
         if waiter.deliver:
             waiter.answer(value)
         else:
+            # It may have been the reply to what was asked behind; but not if it comes in its turn before a fence does.
             for other in {later.waiter for later in line[place:]}:
-                other.nudge()
+                if sent.passed <= now or not other.fenced:
+                    other.nudge()
 
         if not line:
             self._lines.pop(frame.key, None)
@@ -288,6 +290,7 @@ class Waiter(Generic[F]):
 
     Attributes:
         sends: When its requests were sent.
+        fenced: Whether something else was asked before its request, because replies of its key were owed.
         held: Replies that are kept back until it is proven that none of them is a straggler; None if that is not done.
         misfit: Why the last frame of this key could not be the reply, if one came.
     """
@@ -296,6 +299,7 @@ class Waiter(Generic[F]):
         "accept",
         "deliver",
         "echo",
+        "fenced",
         "held",
         "key",
         "lenient",
@@ -325,6 +329,7 @@ class Waiter(Generic[F]):
         self.accept = accept
         self.tombstone = tombstone
         self.deliver: Callable[[Any], None] | None = None
+        self.fenced = False
         self.held: list[Any] | None = None
         self.misfit: ProtocolError | None = None
         self.sends: list[float] = []

@@ -35,13 +35,13 @@ class Posted(Generic[R]):
         name: str,
         waiter: Waiter[Any],
         round_trip: RoundTrip,
-        give_turn: Callable[[], None],
+        give_turn: Callable[[], None] | None,
     ) -> None:
         self._link = link
         self._round_trip = round_trip
         self._name = name
         self._waiter = waiter.__enter__()
-        self._give_turn: Callable[[], None] | None = give_turn
+        self._give_turn = give_turn
         self._reply: asyncio.Future[R] = asyncio.get_running_loop().create_future()
         waiter.listen(partial(deliver, self._reply))
 
@@ -66,15 +66,20 @@ class Posted(Generic[R]):
         return self._link.answer(self._reply)
 
     @property
+    def done(self) -> bool:
+        """Whether its answer has come."""
+        return self._reply.done()
+
+    @property
     def sent_at(self) -> float:
         """When it was sent, in the loop's seconds."""
         return self._waiter.sends[0]
 
     def forget(self) -> None:
         """Stops waiting; may be called again."""
+        self._waiter.__exit__()
         give_turn, self._give_turn = self._give_turn, None
         if give_turn:
-            self._waiter.__exit__()
             give_turn()
 
 

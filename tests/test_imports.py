@@ -1,6 +1,6 @@
 """The way of the imports, read from the source: layers know nothing of higher ones, and families not of each other.
 
-errors <- wire, pending, ... <- transports <- link <- motion <- families <- simulator <- cli <- __main__
+errors <- wire, pending, ... <- transports <- link <- motion <- families <- discovery <- simulator <- cli <- __main__
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ FAMILIES = ("magician", "mycobot", "ultraarm")
 LAYERS = (
     ("errors",),
     ("wire", "events", "pending", "turns", "roundtrip"),
-    ("layouts", "executor", "transports"),
-    ("link",),
-    ("motion",),
+    ("layouts", "executor", "transports", "contract", "posted"),
+    ("link", "hosted"),
+    ("motion", "bridged"),
+    ("family",),
     FAMILIES,
-    ("simulator",),
+    ("discovery", "fleet"),
+    ("simulator", "bridge"),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )
@@ -96,14 +98,14 @@ def test_the_layers_are_seen_at_all() -> None:
     assert own_imports(ROOT / "magician" / "arm.py") >= {"link", "motion", "magician"}
 
 
-def test_modules_are_named_as_strings_by_the_transports_alone() -> None:
+def test_modules_are_named_as_strings_by_the_transports_and_the_package_alone() -> None:
     late = {name_of(path) for path in SOURCES if words(path) & {"import_module", "__import__", "importlib"}}
-    assert late == {str(Path("transports", "__init__.py"))}
+    assert late == {"__init__.py", str(Path("transports", "__init__.py"))}
 
 
 @pytest.mark.parametrize("statement", ["import dobot_async", "from dobot_async import Magician, open_transport"])
 def test_importing_the_package_brings_in_nothing_that_is_not_used_yet(statement: str) -> None:
-    late = ["serial", "serial_asyncio", "bleak", "click", "rich", "dobot_async.simulator", "dobot_async.cli"]
+    late = ["serial", "serial_asyncio", "bleak", "zenoh", "click", "rich", "dobot_async.simulator", "dobot_async.cli"]
     program = f"{statement}\nimport sys\nprint([name for name in {late!r} if name in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
     assert ran.stdout.strip() == "[]"

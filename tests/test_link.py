@@ -531,6 +531,39 @@ async def test_who_is_answered_after_a_swallowed_reply_is_not_measured() -> None
         assert trip.smoothed is None
 
 
+async def test_a_late_answer_costs_the_next_question_a_few_frames_and_no_later_one() -> None:
+    near, other = memory_pair(in_flight=8, buffer=1000)
+    far = Far(other)
+    link = Link(near, Parser(), request, url="memory:", fences=(c.GET_DEVICE_NAME, c.GET_DEVICE_ID))
+    async with aclosing(other), aclosing(link):
+        late = start(link.request(TIME, None))
+        first = await far.one()
+        await asyncio.sleep(0.11)
+        again = await far.one()
+        await far.say(numbered(first, 1))
+        assert await late == 1
+
+        number = 1
+
+        async def answer() -> None:
+            nonlocal number
+            await far.say(numbered(again, 0))  # the one that is still owed
+            while True:
+                for frame in await far.arrived():
+                    number += frame.id == TIME.id
+                    await far.say(numbered(frame, number) if frame.id == TIME.id else frame._replace(params=bytes(12)))
+
+        async with running(answer()):
+            before = link.stats.sent
+            assert await link.request(TIME, None) > 1
+            assert link.stats.sent - before <= 4
+            before = link.stats.sent
+            for _ in range(10):
+                assert await link.request(TIME, None) > 1
+
+            assert link.stats.sent - before == 10
+
+
 async def test_an_answer_that_is_late_alone_answers_nobody_whenever_it_comes() -> None:
     """Asked without a pause, so that it comes between a question and its answer."""
     for moment in (1.5, 1.5004, 1.5008, 1.5012):
@@ -839,7 +872,7 @@ class Torn:
 
 
 async def test_the_end_of_the_stream_reaches_everybody_once() -> None:
-    async with line(in_flight=2) as (link, far):
+    async with line(in_flight=1) as (link, far):
         posted = await post(link, 1)
         calls = [start(link.request(TIME, None)) for _ in range(3)]
         calls += [start(posted.answer()), start(post(link, 2)), start(link.request(c.GET_POSE, None, urgent=True))]

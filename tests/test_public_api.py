@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 import dobot_async
@@ -9,15 +14,25 @@ import dobot_async
 NAMES = [
     "Alarm",
     "ArmAlarm",
+    "CobotAlarm",
+    "CobotInfo",
+    "CobotModel",
+    "CobotPose",
     "ColorPort",
     "Command",
     "CommandRejected",
     "ConnectFailed",
     "ConnectionLost",
+    "Coords",
     "DeviceInfo",
+    "DiscoveryProblem",
     "DobotError",
     "EndEffectorParams",
+    "EndType",
+    "Fleet",
+    "Found",
     "Gripper",
+    "GripperType",
     "HHTTrigMode",
     "IOFunction",
     "InfraredPort",
@@ -32,15 +47,25 @@ NAMES = [
     "Motion",
     "MotionStopped",
     "MotionUnknown",
+    "MoveMode",
+    "MyCobot",
     "PTPMode",
     "Pen",
+    "PinMode",
     "Pose",
     "ProtocolError",
+    "ReferenceFrame",
     "ReplyTimeout",
     "SuctionCup",
     "TriggerADCCondition",
+    "UltraArm",
+    "UltraArmAngles",
+    "UltraArmCoords",
+    "UltraArmJog",
+    "UltraArmLimits",
     "Unexpected",
     "Unreachable",
+    "discover",
     "open_transport",
 ]
 
@@ -48,6 +73,24 @@ NAMES = [
 def test_the_public_names_are_pinned() -> None:
     assert sorted(dobot_async.__all__) == NAMES
     assert len(set(dobot_async.__all__)) == len(dobot_async.__all__)
+
+
+def test_type_checkers_see_each_name_where_it_is_at_home() -> None:
+    stub = ast.parse(Path(dobot_async.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+    seen = {
+        alias.name: str(node.module).removeprefix("dobot_async.")
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert seen == vars(dobot_async)["HOME"]
+
+
+def test_the_package_alone_imports_nothing_of_an_arm() -> None:
+    program = "import dobot_async, sys; print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    assert {name for name in modules if name.startswith("dobot_async")} == {"dobot_async"}
+    assert not {"anyio", "bleak", "serial"} & set(modules)
 
 
 @pytest.mark.parametrize("name", NAMES)

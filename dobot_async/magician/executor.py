@@ -13,6 +13,7 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
 from dobot_async.errors import MotionUnknown, ProtocolError, ReplyTimeout
@@ -52,6 +53,30 @@ class Surplus:
 
     def __repr__(self) -> str:
         return f"<Surplus of {self.count} queued commands: doubled by the network, or queued by somebody else>"
+
+
+@dataclass(slots=True)
+class Burst:
+    """Commands that were sent together.
+
+    Attributes:
+        posted: The commands.
+        complete: Tells, by the time that what was asked behind them is answered, whether they were all acknowledged.
+    """
+
+    posted: list[Posted[int]] = field(default_factory=list)
+    complete: Posted[bool] | None = None
+
+    @property
+    def acknowledged(self) -> bool:
+        """Whether all of them are."""
+        return all(each.done for each in self.posted)
+
+    def forget(self) -> None:
+        """Stops waiting; may be called again."""
+        for each in (*self.posted, self.complete):
+            if each:
+                each.forget()
 
 
 class MagicianExecutor:
@@ -211,30 +236,58 @@ class MagicianExecutor:
         self._controlled_at = self._now()
 
     async def _stream(self, todo: deque[Entry]) -> None:
-        """Sends commands in bursts of a window, and enters a burst once all of it is acknowledged.
+        """Sends commands in bursts, one of which is on its way while the one before is acknowledged."""
+        bursts: deque[Burst] = deque()
+        try:
+            while todo or bursts:
+                while todo and len(bursts) < min(self._window, 2):
+                    bursts.append(await self._burst(todo))
 
-        An acknowledgement does not say whose it is: with one command of a burst lost, the next one's would pass for it.
+                await self._take(bursts[0])
+                bursts.popleft()
+        finally:
+            for burst in bursts:
+                burst.forget()
+
+    async def _burst(self, todo: deque[Entry]) -> Burst:
+        """Sends half a window of commands, and something to read behind them.
+
+        An acknowledgement does not say whose it is: with one command lost, the next one's would pass for it. But what
+        is read behind them is answered behind their own acknowledgements; by then all of those must be there.
         """
-        while todo:
-            await self._verify()
-            posted: list[Posted[int]] = []
-            try:
-                while todo and len(posted) < self._window:
-                    posted.append(await self._post(todo.popleft()))
+        await self._verify()
+        burst = Burst()
+        try:
+            while todo and len(burst.posted) < max(1, self._window // 2):
+                burst.posted.append(await self._post(todo.popleft()))
 
-                indices = [await each.answer() for each in posted]
-            finally:
-                for each in posted:
-                    each.forget()
+            if self._window > 1:
+                behind = self._link.frame(c.GET_QUEUED_CMD_LEFT_SPACE, None)
+                burst.complete = await self._link.post(
+                    behind, lambda _: burst.acknowledged, name="a window of commands", timeout=SILENCE, tombstone=True
+                )
+        except BaseException:
+            burst.forget()
+            raise
 
-            self._queued_at = self._now()
-            if len(indices) > 1 and indices != list(range(indices[0], indices[0] + len(indices))):
-                raise MotionUnknown(f"commands of a burst got the indices {indices}: nothing tells which were taken")
+        return burst
 
-            for index in indices:
-                entry, surplus = self._books.acknowledge(index)
-                self._accepted(entry, index)
-                self._surplus(surplus)
+    async def _take(self, burst: Burst) -> None:
+        """Enters a burst once all of it is acknowledged."""
+        try:
+            indices = [await each.answer() for each in burst.posted]
+            complete = burst.complete is None or await burst.complete.answer()
+        finally:
+            burst.forget()
+
+        self._queued_at = self._now()
+        if not complete or indices != list(range(indices[0], indices[0] + len(indices))):
+            raise MotionUnknown(f"commands sent together got the indices {indices}: nothing tells which were taken")
+
+        for index in indices:
+            entry, surplus = self._books.acknowledge(index)
+            self._accepted(entry, index)
+            self._surplus(surplus)
 
     async def _verify(self) -> None:
         """Makes sure, on a link that doubles messages, that nothing was taken twice: it would pass for what comes next.

@@ -119,6 +119,7 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
             frame.Parser(arm_model.known),
             frame.request,
             url=url,
+            fences=(c.IS_POWER_ON, c.IS_CONTROLLER_CONNECTED),
             read_only=not control,
             round_trip=RoundTrip(floor, ceiling),
             reopen=reopen if reconnect else None,

@@ -1,0 +1,99 @@
+# The names of __init__.py, for type checkers.
+
+from dobot_async.contract import LinkState, LinkStats, Unexpected
+from dobot_async.discovery import DiscoveryProblem, Found, discover
+from dobot_async.errors import (
+    ArmAlarm,
+    CommandRejected,
+    ConnectFailed,
+    ConnectionLost,
+    DobotError,
+    MotionStopped,
+    MotionUnknown,
+    ProtocolError,
+    ReplyTimeout,
+)
+from dobot_async.fleet.fleet import Fleet
+from dobot_async.link import Link
+from dobot_async.magician.alarms import Alarm
+from dobot_async.magician.arm import DeviceInfo, Jog, Magician
+from dobot_async.magician.effectors import Gripper, Laser, Pen, SuctionCup
+from dobot_async.magician.kinematics import JointLimits, Kinematics, Unreachable
+from dobot_async.magician.params import (
+    ColorPort,
+    EndEffectorParams,
+    HHTTrigMode,
+    InfraredPort,
+    IOFunction,
+    Pose,
+    PTPMode,
+    TriggerADCCondition,
+)
+from dobot_async.motion import Motion
+from dobot_async.mycobot.alarms import CobotAlarm
+from dobot_async.mycobot.arm import MyCobot
+from dobot_async.mycobot.models import CobotModel
+from dobot_async.mycobot.params import Coords, EndType, GripperType, MoveMode, PinMode, ReferenceFrame
+from dobot_async.mycobot.readings import CobotInfo, CobotPose
+from dobot_async.transports import open_transport
+from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
+from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits
+from dobot_async.wire import Command
+
+__all__ = [
+    "Alarm",
+    "ArmAlarm",
+    "CobotAlarm",
+    "CobotInfo",
+    "CobotModel",
+    "CobotPose",
+    "ColorPort",
+    "Command",
+    "CommandRejected",
+    "ConnectFailed",
+    "ConnectionLost",
+    "Coords",
+    "DeviceInfo",
+    "DiscoveryProblem",
+    "DobotError",
+    "EndEffectorParams",
+    "EndType",
+    "Fleet",
+    "Found",
+    "Gripper",
+    "GripperType",
+    "HHTTrigMode",
+    "IOFunction",
+    "InfraredPort",
+    "Jog",
+    "JointLimits",
+    "Kinematics",
+    "Laser",
+    "Link",
+    "LinkState",
+    "LinkStats",
+    "Magician",
+    "Motion",
+    "MotionStopped",
+    "MotionUnknown",
+    "MoveMode",
+    "MyCobot",
+    "PTPMode",
+    "Pen",
+    "PinMode",
+    "Pose",
+    "ProtocolError",
+    "ReferenceFrame",
+    "ReplyTimeout",
+    "SuctionCup",
+    "TriggerADCCondition",
+    "UltraArm",
+    "UltraArmAngles",
+    "UltraArmCoords",
+    "UltraArmJog",
+    "UltraArmLimits",
+    "Unexpected",
+    "Unreachable",
+    "discover",
+    "open_transport",
+]
