@@ -81,12 +81,13 @@ class Parser:
     def __init__(self) -> None:
         self.junk_bytes = 0
         self.bad_frames = 0
-        self._buffer = bytearray()
+        self._buffer = b""
+        self._whole = 0  # how long the buffer has to be for the candidate at its beginning to be whole
 
     def feed(self, data: bytes) -> list[Frame]:
         """Takes the next bytes of the stream, returns the frames that they complete."""
         self._buffer += data
-        return self._scan(0)
+        return self._scan(0) if len(self._buffer) >= self._whole else []
 
     def resync(self) -> list[Frame]:
         """Gives up the frame that is still incomplete, returns all whole frames that lie inside of it and behind it.
@@ -101,27 +102,28 @@ class Parser:
     def reset(self) -> None:
         """Forgets the frame that is still incomplete: another stream begins."""
         self.junk_bytes += len(self._buffer)
-        self._buffer.clear()
+        self._buffer = b""
+        self._whole = 0
 
     def _scan(self, at: int, *, overdue: bool = False) -> list[Frame]:
         """Takes all frames out of the buffer, beginning at an offset.
 
         Ends at the first incomplete candidate; if it is overdue, looks for whole frames behind it first.
         """
-        buffer = self._buffer
+        buffer, size = self._buffer, len(self._buffer)
         frames: list[Frame] = []
         framed = 0
         keep = None
         while True:
             at = find_header(buffer, at)
-            if len(buffer) - at <= len(HEADER):
+            if size - at <= len(HEADER):
                 break
 
             length = buffer[at + 2]
             end = at + OVERHEAD + length
             if not MIN_LENGTH <= length <= MAX_LENGTH or length == HEADER_LENGTH:
                 at += 1
-            elif end > len(buffer):
+            elif end > size:
                 keep = at if keep is None else keep
                 if not overdue:
                     break
@@ -131,18 +133,19 @@ class Parser:
                 self.bad_frames += 1
                 at += 1
             else:
-                frames.append(Frame(buffer[at + 3], buffer[at + 4], bytes(buffer[at + 5 : end - 1])))
+                frames.append(Frame(buffer[at + 3], buffer[at + 4], buffer[at + 5 : end - 1]))
                 framed += end - at
                 keep = None
                 at = end
 
         at = at if keep is None else keep
+        self._whole = OVERHEAD + buffer[at + 2] if keep is not None else 0
         self.junk_bytes += at - framed
-        del buffer[:at]
+        self._buffer = buffer[at:]
         return frames
 
 
-def find_header(buffer: bytearray, at: int) -> int:
+def find_header(buffer: bytes, at: int) -> int:
     """The offset of the next header, or of the half of one at the end, or the end."""
     start = buffer.find(HEADER, at)
     return start if start >= 0 else len(buffer) - buffer.endswith(HEADER[:1], at)
