@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 from dobot_async.contract import Encoder, Frame, Parser
+from dobot_async.transports import Transport
 
 __all__ = ["Bridged", "Kind", "Reading", "Watch"]
 
@@ -66,7 +67,7 @@ class Bridged(Protocol[F]):
 
     @property
     def model(self) -> str:
-        """What `sim:` is to simulate."""
+        """What `sim:` is to simulate, and what a served arm is called."""
 
     @property
     def filler(self) -> bytes:
@@ -81,6 +82,10 @@ class Bridged(Protocol[F]):
         """What stops the arm, and what it was told, and switches off what burns or turns; the stop comes first."""
 
     @property
+    def proves_stop(self) -> bool:
+        """Whether an answer to a stop proves that the arm obeys; else it is looked at until it is seen to stand."""
+
+    @property
     def denials(self) -> Mapping[str, Collection[Any]]:
         """Groups of commands that can be blocked, by name: the keys of their frames."""
 
@@ -91,6 +96,9 @@ class Bridged(Protocol[F]):
     @property
     def encode(self) -> Encoder[F]:
         """What makes frames of the family's commands."""
+
+    async def open(self, url: str, timeout: float) -> Transport:
+        """Opens the way to an arm, with the family's manners; raises ConnectFailed if that takes too long."""
 
     def parser(self) -> Parser[F]:
         """Returns a parser for one stream."""
@@ -109,6 +117,9 @@ class Bridged(Protocol[F]):
 
     def repeatable(self, request: F) -> bool:
         """Returns whether it does no harm to send it again: never for what moves anything."""
+
+    def may_be_silent(self, request: F) -> bool:
+        """Returns whether the arm may take a request and answer nothing."""
 
     def accept(self, request: F, reply: F) -> F:
         """Returns the reply; raises ProtocolError if it cannot be one to this request."""

@@ -28,7 +28,7 @@ from dobot_async.discovery.families import FAMILIES, Family
 from dobot_async.discovery.found import natural, printable
 from dobot_async.discovery.serial_ports import SerialPorts
 from dobot_async.discovery.wifi import QUESTION, WiFiModules, understood
-from dobot_async.simulator import Simulation, announced, simulate
+from dobot_async.simulator import MyCobotQuirks, Simulation, UltraArmQuirks, announced, simulate
 
 LOOPBACK = "127.255.255.255"
 OWN = f"127.{64 + (os.getpid() >> 8) % 190}.{os.getpid() & 255}"
@@ -165,6 +165,40 @@ async def test_a_probe_tells_who_it_is() -> None:
         (found,) = await everything(sources=[Listed("one", [way(sim.url)])], probe=True)
         assert found == replace(way(sim.url), info=DeviceInfo("DTSIM00000000001", "Dobot Magician", "3.7.0"))
         assert not sim.arm.executed
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
+@pytest.mark.parametrize(
+    ("model", "family", "version"),
+    [
+        ("mycobot280", "mycobot", "1.3"),
+        ("myarm300", "mycobot", "1.3"),
+        ("mypalletizer260", "mycobot", "1.3"),
+        ("ultraarm", "ultraarm", "1.2"),
+    ],
+)
+async def test_other_families_tell_the_version_of_their_firmware(model: str, family: str, version: str) -> None:
+    async with simulate(model, listen="pty") as sim:
+        port = replace(way(sim.url), families=(family,))
+        (found,) = await everything(sources=[Listed("one", [port])], probe=True, probe_timeout=10)
+        assert found == replace(port, info=DeviceInfo("", "", version))
+        assert not sim.arm.executed
+
+
+@pytest.mark.parametrize(
+    ("model", "family", "quirks"),
+    [
+        ("mycobot280", "mycobot", MyCobotQuirks(later=False)),
+        ("ultraarm", "ultraarm", UltraArmQuirks(later=False)),
+    ],
+)
+async def test_older_firmware_tells_no_version(model: str, family: str, quirks: Any) -> None:
+    async with simulate(model, quirks=quirks) as sim:
+        port = replace(way(sim.url), families=(family,))
+        (found,) = await everything(sources=[Listed("one", [port])], probe=True, probe_timeout=2)
+        # An ultraArm's QUEUE SIZE is later firmware's, too, and the driver does not go without.
+        assert found.info == (DeviceInfo("", "", "") if family == "mycobot" else None)
+        assert (found.problem or "").startswith("" if family == "mycobot" else "no ultraArm answers")
 
 
 async def test_two_ways_to_one_arm_are_one_result() -> None:

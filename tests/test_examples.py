@@ -101,6 +101,57 @@ def check_error_handling(output: str) -> None:
     assert kinds == ["wrong port", "checked before", "told by the arm", "too slow", "stopped", "and the arm goes on"]
 
 
+def check_mirror_hand_guided(output: str) -> None:
+    """The follower went where the leader was guided, on the other side."""
+    places = [numbers(line) for line in output.splitlines()]
+    assert places[0] == pytest.approx(Kinematics().forward(0, 45, 45, 0)[:3], abs=0.1)
+    assert places[1:] == [[200 + 5 * step, -4 * step, 40 + step] for step in range(1, 11)]
+
+
+def check_ble_to_websocket_bridge(output: str) -> None:
+    """Through WebSocket comes the pose of an arm that was just switched on."""
+    assert numbers(line_with(output, "pose")) == pytest.approx((259.10, 0, -8.49, 0), abs=0.01)
+
+
+def check_zenoh_two_processes(output: str) -> None:
+    """What was published is where the arm was moved."""
+    lines = output.splitlines()
+    assert lines[0] == "served at zenoh://left"
+    assert [numbers(line) for line in lines[1:]] == [[200, 0, 40], [230, 0, 40], [260, 0, 40], [260, 0, 40]]
+
+
+def check_handover(output: str) -> None:
+    """The arms take turns."""
+    words = ["left has put down part", "right has fetched part"]
+    assert output.splitlines() == [f"{word} {part}" for part in (1, 2, 3) for word in words]
+
+
+def check_conveyor_three_arms(output: str) -> None:
+    """Each part is picked once, in order, and every arm has its share."""
+    *picked, total = output.splitlines()
+    assert [numbers(line)[1] for line in picked] == list(range(1, 10))
+    assert [line.split()[1] for line in picked[:3]] == ["1", "2", "3"]
+    assert sum(numbers(total)[1::2]) == 9
+
+
+def check_mixed_cell(output: str) -> None:
+    (skew,) = numbers(line_with(output, "started within"))
+    assert skew >= 0
+    assert output.splitlines()[-1] == "each was in the middle"
+
+
+def check_mycobot_pick(output: str) -> None:
+    assert output.splitlines()[:2] == ["picked up", "put down"]
+    assert numbers(line_with(output, "joints")) == pytest.approx([-30, -30, -60, 0, 0, 0], abs=0.1)
+
+
+def check_ultraarm_gcode(output: str) -> None:
+    """Each line was told, in order, and the square is closed."""
+    *lines, last = output.splitlines()
+    assert [numbers(line)[0] for line in lines] == [1, 2, 3, 4, 5, 6]
+    assert numbers(last) == [200, -20, 60]
+
+
 CHECKS: dict[str, Callable[[str], None]] = {
     "connect_and_read.py": check_connect_and_read,
     "pick_and_place.py": check_pick_and_place,
@@ -109,6 +160,14 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "io_and_conveyor.py": check_io_and_conveyor,
     "two_arms.py": check_two_arms,
     "error_handling.py": check_error_handling,
+    "mirror_hand_guided.py": check_mirror_hand_guided,
+    "handover.py": check_handover,
+    "conveyor_three_arms.py": check_conveyor_three_arms,
+    "mixed_cell.py": check_mixed_cell,
+    "ble_to_websocket_bridge.py": check_ble_to_websocket_bridge,
+    "zenoh_two_processes.py": check_zenoh_two_processes,
+    "mycobot_pick.py": check_mycobot_pick,
+    "ultraarm_gcode.py": check_ultraarm_gcode,
 }
 
 
@@ -146,6 +205,24 @@ async def test_io_and_conveyor_tells_what_the_world_puts_in() -> None:
     assert numbers(line_with(output, "knob")) == [1234, 4095]
     assert len(ways) == 2
     assert sum(ways) == 0
+
+
+async def test_the_mirror_follows_a_hand_until_ctrl_c() -> None:
+    async with (
+        simulate(listen="tcp://127.0.0.1:0", speed=20) as leader,
+        simulate(listen="tcp://127.0.0.1:0", speed=20) as follower,
+    ):
+        with start("mirror_hand_guided.py", leader.url, follower.url) as process:
+            assert process.stdout is not None
+            await asyncio.to_thread(process.stdout.readline)
+            leader.arm.guide_to(220, 30, 50)
+            line = await asyncio.to_thread(process.stdout.readline)
+            process.send_signal(signal.SIGINT)
+            await asyncio.to_thread(process.communicate)
+
+        assert numbers(line) == [220, -30, 50]
+        assert follower.arm.device.idle
+        assert not leader.arm.executed
 
 
 async def test_ctrl_c_stops_the_arm() -> None:

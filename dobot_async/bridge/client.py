@@ -66,8 +66,8 @@ class Desk(Protocol[F]):
     stops: int
     """How often something stopped the arm; what came before the last time is not sent any more."""
 
-    async def answer(self, client: Client[F], request: Request[F]) -> F:
-        """Returns the arm's reply; raises Refused, or DobotError if there is none."""
+    async def answer(self, client: Client[F], request: Request[F]) -> F | None:
+        """Returns the arm's reply, None where the arm need not answer; raises Refused, or DobotError."""
 
     def refused(self, client: Client[F], name: str, reason: str) -> None:
         """Takes note that a request was not passed on."""
@@ -277,8 +277,9 @@ class Client(Generic[F]):
         except (Refused, DobotError) as error:
             self._complain(self._family.name(request.frame), str(error))
         else:
-            for _ in range(0 if self.gone else request.times):
-                self._deliver(bytes(reply))
+            answer = b"" if reply is None else bytes(reply)
+            for _ in range(request.times if answer and not self.gone else 0):
+                self._deliver(answer)
         finally:
             self._forget(request)
             if request.kind is Kind.STOP:

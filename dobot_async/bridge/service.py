@@ -26,7 +26,7 @@ from dobot_async.bridge.client import Client, Refused, Request
 from dobot_async.bridge.limits import Limits
 from dobot_async.bridged import Bridged, Kind
 from dobot_async.contract import Frame, LinkState
-from dobot_async.errors import ConnectionLost, DobotError
+from dobot_async.errors import ConnectionLost, DobotError, ReplyTimeout
 from dobot_async.events import Events
 from dobot_async.link import Link
 
@@ -35,6 +35,7 @@ __all__ = ["Bridge", "BridgeEvent"]
 F = TypeVar("F", bound=Frame)
 logger = logging.getLogger("dobot_async.bridge")
 STOPPED_WITHIN = 1.0  # seconds until what stops the arm is said again
+LOOKS, LOOK = 3, 0.05  # how often, and how many seconds apart, an arm is seen to stand that need not say so
 FAREWELL = 2.0
 
 
@@ -164,24 +165,19 @@ class Bridge(Generic[F]):
         """Takes note that somebody was not let in."""
         self._tell("turned away", name, reason)
 
-    async def answer(self, client: Client[F], request: Request[F]) -> F:
-        """Returns the arm's reply; raises Refused, or DobotError if there is none."""
-        frame = request.frame
-        if frame.key in self._denied:
+    async def answer(self, client: Client[F], request: Request[F]) -> F | None:
+        """Returns the arm's reply; raises Refused, or DobotError if there should be one."""
+        if request.frame.key in self._denied:
             raise Refused("it is denied here")
 
-        self.family.check(frame)
-        if request.kind is Kind.STOP:
-            return await self._stop(client, frame)
-
-        if request.kind is Kind.WRITE:
-            return await self._write(client, request)
-
-        await client.reads.take(frame.key, 0)
+        self.family.check(request.frame)
         try:
-            return await self._forward(frame, ready=partial(client.sending, request))
-        finally:
-            client.reads.give(frame.key)
+            return await self._pass_on(client, request)
+        except ReplyTimeout:
+            if self.family.may_be_silent(request.frame):
+                return None
+
+            raise
 
     def end(self) -> None:
         """Ends all connections, and takes no more."""
@@ -206,6 +202,21 @@ class Bridge(Generic[F]):
 
         self.events.close()
         await self.link.aclose()
+
+    async def _pass_on(self, client: Client[F], request: Request[F]) -> F:
+        """Passes a request on in the way of its kind."""
+        frame = request.frame
+        if request.kind is Kind.STOP:
+            return await self._stop(client, frame)
+
+        if request.kind is Kind.WRITE:
+            return await self._write(client, request)
+
+        await client.reads.take(frame.key, 0)
+        try:
+            return await self._forward(frame, ready=partial(client.sending, request))
+        finally:
+            client.reads.give(frame.key)
 
     async def _stop(self, client: Client[F], frame: F) -> F:
         """Passes on what stops the arm; nothing that was to be written before it is sent after it."""
@@ -322,12 +333,26 @@ class Bridge(Generic[F]):
             await self.link.opened()
             said = (self._urge(frame) for frame in self.family.stopping)
             heard = await asyncio.gather(*said, return_exceptions=True)
-            if not isinstance(heard[0], BaseException):
+            if isinstance(heard[0], ConnectionLost):
+                raise heard[0]
+
+            if await self._obeys(holder, heard[0]):
                 self._tell("stopped", holder, "it has gone, and the arm was in motion")
                 return
 
-            if isinstance(heard[0], ConnectionLost):
-                raise heard[0]
+    async def _obeys(self, holder: Client[F], answer: object) -> bool:
+        """Whether an arm that was told to stop does so: it has said so, or is seen to stand."""
+        if self.family.proves_stop:
+            return not isinstance(answer, BaseException)
+
+        holder.watch.sent(self.family.stopping[0])
+        for _ in range(LOOKS):
+            if await self._moves_for(holder):
+                return False
+
+            await asyncio.sleep(LOOK)
+
+        return True
 
     async def _urge(self, frame: F) -> F:
         """Says one of the things that stop the arm, again and again for a while."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import AsyncIterator, Collection, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from functools import partial
@@ -10,15 +9,14 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from dobot_async.bridge.doors import Doors, open_doors
+from dobot_async.bridge.families import family_of
 from dobot_async.bridge.limits import Limits
 from dobot_async.bridge.service import Bridge
 from dobot_async.bridged import Bridged
 from dobot_async.contract import Frame
 from dobot_async.errors import ConnectFailed, DobotError
 from dobot_async.link import Link
-from dobot_async.magician.bridged import BRIDGED
 from dobot_async.motion import undisturbed
-from dobot_async.transports import Transport, hidden, open_transport
 
 __all__ = ["bridge"]
 
@@ -38,7 +36,7 @@ async def bridge(
     key: str | Path | None = None,
     origins: Collection[str] = (),
     limits: Limits | None = None,
-    family: Bridged[Any] = BRIDGED,
+    family: str = "magician",
     timeout: float = 5.0,
 ) -> AsyncIterator[Bridge[Any]]:
     """Gives an arm to programs on a network for the length of a block.
@@ -56,31 +54,32 @@ async def bridge(
         key: PEM file with its key, if that is not in the same file.
         origins: Web pages, as `https://host`, that may connect by ws without a token.
         limits: What one client may do.
-        family: How the arm is bridged; the Magician's by default.
+        family: Which arm it is: a name of `FAMILIES`.
         timeout: Seconds until the arm must have answered.
 
     Raises:
         ValueError: An argument is wrong.
         ConnectFailed: No arm answered, or it cannot listen there.
     """
-    unknown = set(deny) - family.denials.keys()
+    known = family_of(family)
+    unknown = set(deny) - known.denials.keys()
     if unknown or on_vanish not in {"stop", "leave"}:
-        raise ValueError(f'expected deny to be of {", ".join(family.denials)}, and on_vanish "stop" or "leave"')
+        raise ValueError(f'expected deny to be of {", ".join(known.denials)}, and on_vanish "stop" or "leave"')
 
     limits = limits or Limits()
     doors = Doors.of([listen] if isinstance(listen, str) else listen, token, certificate, key, origins)
     async with AsyncExitStack() as stack:
-        link = await linked(arm_url, family, timeout)
+        link = await linked(arm_url, known, timeout)
         running: Bridge[Any] = Bridge(
             link,
-            family,
+            known,
             takeover=takeover,
             on_vanish=on_vanish,
-            denied={each for group in deny for each in family.denials[group]},
+            denied={each for group in deny for each in known.denials[group]},
             limits=limits,
         )
         stack.push_async_callback(lambda: undisturbed(running.aclose()))
-        await greet(running.link, family, timeout)
+        await greet(running.link, known, timeout)
         running.urls = await open_doors(doors, running, stack, running.turned_away)
         running.token = doors.token
         stack.callback(running.end)
@@ -89,19 +88,10 @@ async def bridge(
 
 async def linked(url: str, family: Bridged[F], timeout: float) -> Link[F]:
     """Opens the link to the arm, which reopens itself if it breaks."""
-    transport = await opened(url, family.model, timeout)
+    transport = await family.open(url, timeout)
     # `ble:` may be any arm at first, but not another one later.
-    again = partial(opened, getattr(transport, "url", url), family.model, timeout)
+    again = partial(family.open, getattr(transport, "url", url), timeout)
     return Link(transport, family.parser(), family.encode, url=url, filler=family.filler, reopen=again)
-
-
-async def opened(url: str, model: str, timeout: float) -> Transport:
-    """Opens the transport in time."""
-    try:
-        async with asyncio.timeout(timeout):
-            return await open_transport(url, arm=model)
-    except TimeoutError:
-        raise ConnectFailed(f"{hidden(url)} could not be opened within {timeout:.3g} s") from None
 
 
 async def greet(link: Link[F], family: Bridged[F], timeout: float) -> None:

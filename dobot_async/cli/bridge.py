@@ -57,13 +57,8 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
 async def serve(session: Session, *, source: str, token: str | None, **details: Any) -> None:
     """Runs the bridge until it is cancelled."""
     from dobot_async.bridge import bridge as bridged
-    from dobot_async.magician.bridged import BRIDGED
 
-    families = {"magician": BRIDGED}
-    if session.arm not in families:
-        raise click.UsageError(f"{session.arm} cannot be bridged yet")
-
-    async with bridged(source, token=token, family=families[session.arm], **details) as running:
+    async with bridged(source, token=token, family=session.arm, **details) as running:
         answer: dict[str, Any] = {"urls": running.urls}
         text = "\n".join(running.urls)
         if running.token != token:

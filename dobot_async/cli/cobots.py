@@ -12,6 +12,7 @@ import click
 
 from dobot_async.cli.family import Family, Told
 from dobot_async.cli.output import plain
+from dobot_async.cli.pieces import cobot_pieces
 from dobot_async.errors import ProtocolError
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.alarms import CobotAlarm
@@ -149,6 +150,7 @@ def family(name: str) -> Family:
         directions={f"{word}{way}": f"{word}{way}" for word in words for way in "+-"},
         suction=suction,
         describe=describe(model),
+        pieces=cobot_pieces(model),
         numbers=max(model.joints, len(model.reach)),
         alarms=True,
         pump=False,

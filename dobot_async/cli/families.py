@@ -15,6 +15,7 @@ import click
 from dobot_async.cli.cobots import COBOTS
 from dobot_async.cli.family import Family, Reading, Told
 from dobot_async.cli.output import joint_words, tool_words
+from dobot_async.cli.pieces import magician_pieces, ultraarm_pieces
 from dobot_async.cli.trace import described
 from dobot_async.magician import commands as magician
 from dobot_async.magician.alarms import Alarm
@@ -194,6 +195,7 @@ FAMILIES: dict[str, Family] = {
         directions=directions(Jog),
         suction=lambda arm, on: arm.suction(on, pump=on),
         describe=described,
+        pieces=magician_pieces,
         alarms=True,
     ),
     **COBOTS,
@@ -208,6 +210,7 @@ FAMILIES: dict[str, Family] = {
         directions=directions(UltraArmJog),
         suction=UltraArm.suction,
         describe=described_line,
+        pieces=ultraarm_pieces,
     ),
 }
 

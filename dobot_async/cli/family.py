@@ -6,6 +6,8 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from dobot_async.cli.pieces import Pieces
+
 __all__ = ["Family", "Reading", "Told"]
 
 
@@ -40,6 +42,7 @@ class Family:
         directions: What a jog can be called.
         suction: Switches the pump.
         describe: Says what a trace says of a frame.
+        pieces: Finds the frames in bytes.
         numbers: How many numbers a move has at most.
         alarms: Whether it has `get_alarms` and `clear_alarms`.
         pump: Whether it has one.
@@ -55,6 +58,7 @@ class Family:
     directions: Mapping[str, Any]
     suction: Callable[[Any, bool], Awaitable[None]]
     describe: Callable[..., Mapping[str, Any]]
+    pieces: Pieces
     numbers: int = 4
     alarms: bool = False
     pump: bool = True

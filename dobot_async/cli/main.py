@@ -17,14 +17,20 @@ from typing import Any
 
 import click
 
+from dobot_async.cli.bridge import bridge
+from dobot_async.cli.cell import cell
 from dobot_async.cli.commands import COMMANDS
 from dobot_async.cli.decode import decode
 from dobot_async.cli.demo import demo
+from dobot_async.cli.discover import discover_arms
+from dobot_async.cli.gcode import gcode
 from dobot_async.cli.monitor import monitor
 from dobot_async.cli.output import Output
 from dobot_async.cli.program import run_program
+from dobot_async.cli.serve import serve_on_zenoh
 from dobot_async.cli.session import ARMS, Interrupted, Session
 from dobot_async.cli.simulate import simulate
+from dobot_async.cli.wifi import set_up_wifi
 from dobot_async.errors import DobotError
 
 __all__ = ["cli"]
@@ -60,7 +66,7 @@ class Group(click.Group):
 @click.option(
     "--url",
     envvar="DOBOT_URL",
-    help="Where the arm is: serial:///dev/ttyUSB0, serial://COM3, udp://192.168.1.20, tcp://host:port or sim: "
+    help="Where the arm is: serial:///dev/ttyUSB0, serial://COM3, udp://192.168.1.20, tcp://host:port, ble: or sim: "
     "(a simulated one). Default: DOBOT_URL.",
 )
 @click.option("--arm", type=click.Choice(list(ARMS)), default="magician", show_default=True, help="Which arm it is.")
@@ -81,5 +87,18 @@ def cli(ctx: click.Context, url: str | None, arm: str, as_json: bool, trace: str
     ctx.obj = Session(url, arm, trace, Output(as_json))
 
 
-for command in (demo, *COMMANDS, run_program, monitor, simulate, decode):
+for command in (
+    demo,
+    *COMMANDS,
+    run_program,
+    gcode,
+    monitor,
+    cell,
+    discover_arms,
+    set_up_wifi,
+    simulate,
+    bridge,
+    serve_on_zenoh,
+    decode,
+):
     cli.add_command(command)

@@ -6,16 +6,21 @@ do many other devices. Only a probe tells what is behind it.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from dobot_async.errors import CommandRejected, ConnectFailed
 from dobot_async.magician.arm import DeviceInfo, Magician
+from dobot_async.mycobot.arm import MyCobot
+from dobot_async.ultraarm.arm import UltraArm
 
 __all__ = ["CH340", "CH9102", "CP210X", "FAMILIES", "Family"]
 
 CP210X = 0x10C4, 0xEA60
 CH340 = 0x1A86, 0x7523
 CH9102 = 0x1A86, 0x55D4
+ONE_FOR_EACH_NUMBER_OF_JOINTS = ("mycobot280", "myarm300", "mypalletizer260")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +44,44 @@ async def probe_magician(url: str, timeout: float) -> DeviceInfo:
         return await arm.get_info(timeout=timeout)
 
 
+async def probe_mycobot(url: str, timeout: float) -> DeviceInfo:
+    """Asks an arm of the myCobot family who it is. It tells the version of its firmware alone.
+
+    No read of its protocol tells a name, a serial number or the model. The first model answers for all that have as
+    many joints.
+    """
+    loop = asyncio.get_running_loop()
+    deadline = loop.time() + timeout
+    problem = ConnectFailed(f"no time was left to ask {url}")
+    for model in ONE_FOR_EACH_NUMBER_OF_JOINTS:
+        if (left := deadline - loop.time()) <= 0:
+            break  # a silent line has taken it all
+
+        try:
+            async with MyCobot.connect(url, model=model, control=False, timeout=left) as arm:
+                version = (await arm.get_info()).system_version
+        except ConnectFailed as error:
+            problem = error
+        else:
+            return DeviceInfo(serial_number="", name="", version="" if version is None else f"{version:g}")
+
+    raise problem
+
+
+async def probe_ultraarm(url: str, timeout: float) -> DeviceInfo:
+    """Asks an ultraArm who it is. It tells the version of its firmware alone, if that."""
+    async with UltraArm.connect(url, control=False, timeout=timeout) as arm:
+        try:
+            version = await arm.get_version(timeout=timeout)
+        except CommandRejected:  # older firmware does not know the question
+            version = ""
+
+    return DeviceInfo(serial_number="", name="", version=version)
+
+
 FAMILIES = (
     Family("magician", frozenset({CP210X, CH340, CH9102}), probe_magician),
-    Family("mycobot", frozenset({CP210X, CH9102})),
-    Family("ultraarm", frozenset({CH340})),
+    Family("mycobot", frozenset({CP210X, CH9102}), probe_mycobot),
+    Family("ultraarm", frozenset({CH340}), probe_ultraarm),
 )
 """In the order in which they are tried."""

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from dobot_async import Magician
+from dobot_async import Magician, MyCobot
 from dobot_async.simulator import Simulation, simulate
 
 TCP = "tcp://127.0.0.1:0"
@@ -125,6 +125,30 @@ async def test_wrong_usage_and_no_arm(arguments: list[str], code: int, told: str
         assert process.returncode == code
         assert output == b""
         assert told in errors.decode()
+
+
+async def test_an_arm_of_another_family() -> None:
+    async with (
+        simulate("mycobot280", listen=TCP, speed=50) as sim,
+        started(sim.url, TCP, before=("--arm", "mycobot")) as process,
+    ):
+        async with MyCobot.connect(await line(process)) as arm:
+            await arm.move_joints(10, 0, 0, 0, 0, 0)
+
+        process.send_signal(signal.SIGINT)
+        await process.communicate()
+        assert process.returncode == 130
+
+
+@pytest.mark.parametrize(
+    ("arm", "more", "told"),
+    [("ultraarm", (), b"do not tell whose they are"), ("mycobot", ("--deny", "wifi"), b"deny to be of calibration")],
+)
+async def test_what_a_family_cannot_do(arm: str, more: tuple[str, ...], told: bytes) -> None:
+    async with started("sim:", TCP, *more, before=("--arm", arm)) as process:
+        _, errors = await process.communicate()
+        assert process.returncode == 2
+        assert told in b" ".join(errors.split())
 
 
 async def test_it_writes_no_trace(tmp_path: Path) -> None:

@@ -490,6 +490,29 @@ async def test_decode_shows_junk_with_its_reason() -> None:
     assert [piece["offset"] for piece in pieces] == [0, 2, 8, 31, 37]
 
 
+async def test_decode_knows_the_frames_of_a_mycobot() -> None:
+    good = "FE FE 03 12 01 FA"
+    done = await run("--json", "--arm", "mycobot", "decode", "07", good, "FE FE 02 29 FA", "FE FE 02 29 FB")
+    junk, power, stop, wrong = done.answer["pieces"]
+    assert (junk["junk"], junk["offset"]) == ("no header", 0)
+    assert (power["command"], power["reply"], "request" in power) == ("IsPowerOn", True, False)
+    assert (stop["command"], stop["request"]) == ("Stop", None)
+    assert "footer" in wrong["junk"]
+
+
+async def test_decode_knows_the_lines_of_an_ultraarm() -> None:
+    text = b"G0 X200 Y0.5 F100\rM120\r ANGLES[1.00 ,2.00 ,3.00 ,0.00]\r\nERROR: TOO FAR\r\nhello\r\nQUEUE SIZE[3]\r\n"
+    done = await run("--json", "--arm", "ultraarm", "decode", text.hex())
+    move, size, angles, error, hello, waiting = done.answer["pieces"]
+    assert (move["command"], move["request"]["x"], move["request"]["f"]) == ("G0", 200, 100)
+    assert (size["command"], size["request"]) == ("M120", None)
+    assert (angles["command"], angles["reply"]["j2"]) == ("M12", 2)
+    assert (error["command"], error["reply"]) == (None, "TOO FAR")
+    assert "no line" in hello["junk"]
+    assert (waiting["command"], waiting["reply"]["queue_size"]) == ("M120", 3)
+    assert bytes.fromhex("".join(each["raw"] for each in done.answer["pieces"]).replace(" ", "")) == text
+
+
 async def test_decode_reads_as_text() -> None:
     done = await run("decode", *(raw for raw, _, _ in VECTORS), "00")
     assert done.code == 0

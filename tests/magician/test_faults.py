@@ -59,7 +59,7 @@ class BadLine:
 @pytest.fixture
 def lines(monkeypatch: pytest.MonkeyPatch) -> list[BadLine]:
     """The bad lines over which `sim://` is reached from now on."""
-    from dobot_async.magician import arm
+    from dobot_async import family
     from dobot_async.transports import open_transport
 
     made: list[BadLine] = []
@@ -68,7 +68,7 @@ def lines(monkeypatch: pytest.MonkeyPatch) -> list[BadLine]:
         made.append(BadLine(await open_transport(url, arm=arm)))
         return made[-1]
 
-    monkeypatch.setattr(arm, "open_transport", opened)
+    monkeypatch.setattr(family, "open_transport", opened)
     return made
 
 

@@ -1,0 +1,289 @@
+"""`cell`: all arms of a cell file at once.
+
+    dobot-async cell cell.toml status | home | stop | run PROGRAM | watch
+
+`home` and `run` need all arms, and stop them all when one fails. `status`, `stop` and `watch` do what they can with
+each arm, whatever the others do.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, TextIO, TypeVar
+
+import anyio
+import click
+
+from dobot_async.cli.cell_program import execute, parse_cell_program
+from dobot_async.cli.output import Output
+from dobot_async.cli.session import Session, run
+from dobot_async.errors import DobotError
+from dobot_async.fleet.cell import Cell, read_cell
+from dobot_async.fleet.families import family_of
+from dobot_async.fleet.fleet import Fleet
+from dobot_async.fleet.seat import Member
+
+__all__ = ["cell"]
+
+T = TypeVar("T")
+FAILED = 1
+RETRY = 1.0  # seconds until an arm that did not answer is tried again
+COLUMNS = ("arm", "family", "tool in the cell", "alarms", "link")
+
+
+@dataclass(slots=True)
+class Reading:
+    """What an arm of the cell told.
+
+    Attributes:
+        family: Its family.
+        x: Of the tool, in the cell, mm; None if the arm did not answer.
+        y: The same.
+        z: The same.
+        alarms: What is set.
+        error: Why it did not answer.
+    """
+
+    family: str
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
+    alarms: tuple[str, ...] = ()
+    error: str | None = None
+
+    def cells(self, name: str) -> tuple[str, ...]:
+        """The row of a table."""
+        places = (self.x, self.y, self.z)
+        tool = "  ".join(f"{axis} {place:7.2f}" for axis, place in zip("xyz", places, strict=True) if place is not None)
+        return name, self.family, tool or "-", ", ".join(self.alarms) or "none", self.error or "good"
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """The cell file, and how to speak."""
+
+    session: Session
+    path: Path
+
+    @property
+    def output(self) -> Output:
+        """Where to speak."""
+        return self.session.output
+
+    def read(self) -> Cell:
+        """The cell; raises UsageError if the file is wrong."""
+        try:
+            return read_cell(self.path)
+        except ValueError as error:
+            raise click.UsageError(str(error)) from None
+
+
+@click.group()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.pass_context
+def cell(ctx: click.Context, file: Path) -> None:
+    """Drive all arms of a cell, or watch them.
+
+    FILE is a cell file (TOML): arms with their URLs, where they stand, their groups, and zones.
+    """
+    ctx.meta[__name__] = Chosen(ctx.obj, file)
+
+
+def chosen() -> Chosen:
+    """What stands before the subcommand."""
+    found: Chosen = click.get_current_context().meta[__name__]
+    return found
+
+
+@cell.command()
+def status() -> None:
+    """Tell of each arm where its tool is, and its alarms.
+
+    Ends with 1 if an arm does not answer.
+    """
+    here = chosen()
+    cell = here.read()
+    readings = run(alone(cell, lambda name, arm: read(cell.members[name], arm), control=False))
+    told = {name: told_by(cell.members[name], each) for name, each in readings.items()}
+    here.output.answer({"arms": told}, table_text(told))
+    end_with({name: each.error for name, each in told.items()})
+
+
+@cell.command()
+def home() -> None:
+    """Drive all arms home, which calibrates them.
+
+    What earlier programs left in their queues is thrown away. Guarded arms go one after the other.
+    """
+    here = chosen()
+    here.read()
+
+    async def work() -> None:
+        async with Fleet.from_file(here.path) as fleet:
+            here.session.commanding = True
+            await fleet.each("home")
+
+    with here.output.working("homing"):
+        run(work())
+
+    here.output.answer({"home": True}, "all arms are home")
+
+
+@cell.command()
+def stop() -> None:
+    """Stop all arms now, and empty their queues; those that answer, if others do not."""
+    here = chosen()
+    results = run(alone(here.read(), lambda _, arm: arm.stop(), control=True))
+    errors = {name: str(error) if isinstance(error, Exception) else None for name, error in results.items()}
+    text = "\n".join(f"{name}: {error or 'stopped'}" for name, error in errors.items())
+    here.output.answer({"stopped": {name: error is None for name, error in errors.items()}, "errors": errors}, text)
+    end_with(errors)
+
+
+@cell.command("run")
+@click.argument("program", type=click.File("r", encoding="utf-8-sig"))
+def run_program(program: TextIO) -> None:
+    """Run a program of all arms.
+
+    PROGRAM (- is standard input) has lines such as: left: move 200 0 50. Before the colon stand names of arms, or * for
+    all, behind it a verb as for the command run, or: barrier NAME, zone NAME, leave NAME. The arms run side by side,
+    each its own lines. All lines are checked before anything is sent.
+    """
+    here = chosen()
+    cell = here.read()
+    try:
+        steps = parse_cell_program(program, cell)
+    except ValueError as error:
+        raise click.UsageError(f"{program.name} is wrong, and nothing was sent:\n{error}") from None
+
+    async def work() -> None:
+        async with Fleet.from_file(here.path) as fleet:
+            here.session.commanding = True
+            await execute(fleet, steps)
+
+    with here.output.working(program.name):
+        run(work())
+
+    done = {name: len(each) for name, each in steps.items()}
+    here.output.answer({"file": program.name, "commands": done}, f"{program.name}: {sum(done.values())} commands done")
+
+
+@cell.command()
+@click.option("--rate", type=click.FloatRange(0, min_open=True), default=5.0, show_default=True, help="Readings/s.")
+@click.option("--count", type=click.IntRange(1), help="End after so many readings.")
+def watch(rate: float, count: int | None) -> None:
+    """Watch all arms, in place on a terminal, elsewhere some lines for each reading.
+
+    Ends with Ctrl-C, and does not disturb programs that run on the arms, as far as their links can be shared.
+    """
+    here = chosen()
+    cell = here.read()
+    if here.output.terminal:
+        with here.output.table(COLUMNS) as draw:
+            run(observe(cell, rate, count, lambda told: draw([each.cells(name) for name, each in told.items()])))
+    else:
+        run(observe(cell, rate, count, lambda told: here.output.answer({"arms": told}, table_text(told))))
+
+
+async def alone(
+    cell: Cell, question: Callable[[str, Any], Awaitable[T]], *, control: bool
+) -> dict[str, T | BaseException]:
+    """Asks each arm for itself, at the same time; returns its answer, or why there is none."""
+
+    async def asked(name: str, member: Member[Any]) -> T:
+        options = {**member.options, "control": control, "queue": "keep"}
+        async with family_of(member.kind).kind.connect(member.url, **options) as arm:
+            return await question(name, arm)
+
+    work = [asked(name, member) for name, member in cell.members.items()]
+    results = await asyncio.gather(*work, return_exceptions=True)
+    for result in results:
+        if isinstance(result, BaseException) and not isinstance(result, (DobotError, OSError)):
+            raise result
+
+    return dict(zip(cell.members, results, strict=True))
+
+
+async def read(member: Member[Any], arm: Any) -> Reading:
+    """Asks an arm for what is shown."""
+    family = family_of(member.kind)
+    place = await family.place(arm)
+    x, y, z, _ = member.base.to_cell(*place)
+    alarms = tuple(map(str, await arm.get_alarms())) if hasattr(arm, "get_alarms") else ()
+    return Reading(family.name, round(x, 3), round(y, 3), round(z, 3), alarms)
+
+
+async def observe(cell: Cell, rate: float, count: int | None, show: Callable[[Mapping[str, Reading]], None]) -> None:
+    """Shows what all arms tell at each tick; arms that do not answer are tried again."""
+    told = {name: Reading(family_of(member.kind).name, error="connecting") for name, member in cell.members.items()}
+    first = {name: asyncio.Event() for name in told}
+
+    def note(name: str, reading: Reading) -> None:
+        told[name] = reading
+        first[name].set()
+
+    tasks = [
+        asyncio.create_task(follow(member, 1 / rate, partial(note, name))) for name, member in cell.members.items()
+    ]
+    try:
+        for event in first.values():
+            await event.wait()
+
+        for number in itertools.count(1):
+            show(told)
+            if number == count:
+                break
+
+            await anyio.sleep(1 / rate)
+    finally:
+        for task in tasks:
+            task.cancel()
+
+        with anyio.CancelScope(shield=True):
+            await asyncio.wait(tasks)
+
+        for task in tasks:
+            if not task.cancelled():
+                task.result()
+
+
+async def follow(member: Member[Any], interval: float, note: Callable[[Reading], None]) -> None:
+    """Notes what one arm tells, for ever."""
+    options = {**member.options, "control": False, "queue": "keep"}
+    while True:
+        try:
+            async with family_of(member.kind).kind.connect(member.url, **options) as arm:
+                while True:
+                    note(await read(member, arm))
+                    await anyio.sleep(interval)
+        except (DobotError, OSError) as error:
+            note(told_by(member, error))
+            await anyio.sleep(RETRY)
+
+
+def told_by(member: Member[Any], answer: Reading | BaseException) -> Reading:
+    """What an arm told, or why it did not."""
+    if isinstance(answer, BaseException):
+        return Reading(family_of(member.kind).name, error=str(answer))
+
+    return answer
+
+
+def table_text(told: Mapping[str, Reading]) -> str:
+    """A line for each arm."""
+    return "\n".join("  |  ".join(each.cells(name)) for name, each in told.items())
+
+
+def end_with(errors: Mapping[str, str | None]) -> None:
+    """Ends the command with 1 if there are errors, each on a line of standard error."""
+    failed = {name: error for name, error in errors.items() if error}
+    for name, error in failed.items():
+        click.echo(f"error: {name}: {' '.join(error.split())}", err=True)
+
+    if failed:
+        click.get_current_context().exit(FAILED)

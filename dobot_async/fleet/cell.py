@@ -1,0 +1,214 @@
+"""Cell files: which arms there are, where they stand, and what they share. TOML.
+
+[arms.left]
+url = "serial:///dev/ttyUSB0"
+family = "magician"                          # or "mycobot" (with model = "..."), "ultraarm"
+base = { x = 0, y = 0, z = 0, yaw = 0 }      # mm and degrees, in the cell
+group = "loading"
+guard = "wait"                               # or "raise", "off"
+clearance = 20
+limits = { x = [100, 300], z = [0, 200] }    # in the cell
+options = { check_reach = true }             # of `connect`
+
+[zones.bin]
+box = { x = [150, 250], y = [-50, 50], z = [0, 100] }
+
+[zones.feeder]
+cylinder = { x = 200, y = 200, radius = 60 }
+
+[groups.loading]
+on_failure = "group"                         # or "fleet", "alone"
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from dobot_async.fleet.families import FAMILIES, AnyArm
+from dobot_async.fleet.frames import BaseFrame
+from dobot_async.fleet.seat import Member
+from dobot_async.fleet.shapes import Box, Cylinder, Shape
+
+__all__ = ["Cell", "parse_cell", "read_cell"]
+
+KINDS = {family.name: kind for kind, family in FAMILIES.items()}
+ARM_KEYS = ("url", "family", "model", "base", "group", "guard", "clearance", "limits", "options")
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What a cell file says.
+
+    Attributes:
+        members: The arms.
+        zones: The zones, by name.
+        groups: Which arms stop when one of a group fails.
+    """
+
+    members: Mapping[str, Member[AnyArm]]
+    zones: Mapping[str, Shape | None]
+    groups: Mapping[str, Any]
+
+
+def read_cell(path: Path) -> Cell:
+    """Reads a cell file; raises ValueError, with the place in it, if it is wrong."""
+    try:
+        return parse_cell(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def parse_cell(text: str) -> Cell:
+    """Returns what the text of a cell file says; raises ValueError, with the place in it, if it is wrong."""
+    whole = tomllib.loads(text)
+    known(whole, ("arms", "zones", "groups"), "the file")
+    arms, zones, groups = (tables(whole.get(name, {}), name) for name in ("arms", "zones", "groups"))
+    if not arms:
+        raise ValueError("there are no arms; begin with [arms.NAME] and its url")
+
+    cell = Cell(
+        {name: at(f"arms.{name}", member, table) for name, table in arms.items()},
+        {name: at(f"zones.{name}", shape, table) for name, table in zones.items()},
+        {name: at(f"groups.{name}", on_failure, table) for name, table in groups.items()},
+    )
+    for name, each in cell.members.items():
+        if each.group is not None and each.group not in cell.groups:
+            raise ValueError(f"arms.{name}.group: there is no [groups.{each.group}]")
+
+    return cell
+
+
+def member(table: Mapping[str, Any]) -> Member[AnyArm]:
+    """An arm."""
+    known(table, ARM_KEYS, "an arm")
+    url, family = text(table, "url"), text(table, "family", "magician")
+    if family not in KINDS:
+        raise ValueError(f"family: one of {', '.join(KINDS)}, not {family!r}")
+
+    options = dict(sub(table, "options"))
+    if "model" in table:
+        options["model"] = text(table, "model")
+
+    limits = sub(table, "limits")
+    return Member(
+        url,
+        cast("type[AnyArm]", KINDS[family]),
+        options=options,
+        base=at("base", frame, sub(table, "base")),
+        group=text(table, "group") if "group" in table else None,
+        guard=cast(Any, text(table, "guard", "off")),
+        clearance=number(table, "clearance", 0.0),
+        limits=at("limits", box, limits) if limits else None,
+    )
+
+
+def frame(table: Mapping[str, Any]) -> BaseFrame:
+    """Where an arm stands."""
+    names = ("x", "y", "z", "yaw")
+    known(table, names, "a base")
+    return BaseFrame(*(number(table, name, 0.0) for name in names))
+
+
+def shape(table: Mapping[str, Any]) -> Shape | None:
+    """A zone: a box, a cylinder, or nowhere in particular."""
+    known(table, tuple(SHAPES), "a zone")
+    if len(table) > 1:
+        raise ValueError("either a box or a cylinder")
+
+    for name in table:
+        return cast(Shape, at(name, SHAPES[name], sub(table, name)))
+
+    return None
+
+
+def box(table: Mapping[str, Any]) -> Box:
+    """A box; an axis that is not given is endless."""
+    known(table, ("x", "y", "z"), "a box")
+    if not table:
+        raise ValueError("a box has x, y or z, each [lowest, highest]")
+
+    return Box(**{name: span(table, name) for name in table})
+
+
+def cylinder(table: Mapping[str, Any]) -> Cylinder:
+    """A cylinder; without z it is endless."""
+    known(table, ("x", "y", "radius", "z"), "a cylinder")
+    height = {"z": span(table, "z")} if "z" in table else {}
+    return Cylinder(number(table, "x"), number(table, "y"), number(table, "radius"), **height)
+
+
+SHAPES: Mapping[str, Callable[[Mapping[str, Any]], Shape]] = {"box": box, "cylinder": cylinder}
+
+
+def on_failure(table: Mapping[str, Any]) -> str:
+    """Who stops when an arm of a group fails."""
+    known(table, ("on_failure",), "a group")
+    found = text(table, "on_failure", "fleet")
+    if found not in {"fleet", "group", "alone"}:
+        raise ValueError(f'on_failure: "fleet", "group" or "alone", not {found!r}')
+
+    return found
+
+
+def at(place: str, read: Callable[[Mapping[str, Any]], Any], table: Mapping[str, Any]) -> Any:
+    """Reads a table; errors get its place."""
+    try:
+        return read(table)
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}") from None
+
+
+def known(table: Mapping[str, Any], names: Collection[str], what: str) -> None:
+    """Raises ValueError for a key that there is not."""
+    for name in table:
+        if name not in names:
+            raise ValueError(f"{what} has no {name!r}; there are: {', '.join(names)}")
+
+
+def tables(value: Any, name: str) -> Mapping[str, Mapping[str, Any]]:
+    """A table of tables."""
+    if not isinstance(value, dict) or not all(isinstance(each, dict) for each in value.values()):
+        raise ValueError(f"{name}: expected tables, such as [{name}.NAME]")
+
+    return value
+
+
+def sub(table: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """A table in a table; empty if it is not there."""
+    value = table.get(name, {})
+    if isinstance(value, dict):
+        return value
+
+    raise ValueError(f"{name}: expected a table, such as {name} = {{ ... }}, not {value!r}")
+
+
+def text(table: Mapping[str, Any], name: str, default: str | None = None) -> str:
+    """A text; raises ValueError if it is missing and there is no default."""
+    value = table.get(name, default)
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"{name}: {'it is missing' if value is None else f'expected a text, not {value!r}'}")
+
+    return value
+
+
+def number(table: Mapping[str, Any], name: str, default: float | None = None) -> float:
+    """A number; raises ValueError if it is missing and there is no default."""
+    value = table.get(name, default)
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value)
+
+    raise ValueError(f"{name}: {'it is missing' if value is None else f'expected a number, not {value!r}'}")
+
+
+def span(table: Mapping[str, Any], name: str) -> tuple[float, float]:
+    """Two numbers."""
+    value = table[name]
+    if not isinstance(value, list) or len(value) != 2:
+        raise ValueError(f"{name}: expected [lowest, highest], not {value!r}")
+
+    low, high = (number({name: each}, name) for each in value)
+    return low, high

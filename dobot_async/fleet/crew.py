@@ -1,0 +1,175 @@
+"""What holds a fleet together: the tasks that hold its connections, and what happens when an arm fails.
+
+Each arm has a task of its own in which its connection's block is entered and left, so that nothing is held open across
+the caller's code, and his exceptions reach him as they are.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Collection, Mapping
+from contextlib import asynccontextmanager, suppress
+from typing import Any, Generic, Literal, Self, TypeVar
+
+from dobot_async.errors import DobotError, MotionStopped
+from dobot_async.fleet.barriers import Barriers
+from dobot_async.fleet.claims import Party
+from dobot_async.fleet.seat import Member, Seat
+from dobot_async.fleet.shapes import Shape
+from dobot_async.fleet.work import end, named
+from dobot_async.fleet.zones import Zones
+from dobot_async.motion import undisturbed
+
+__all__ = ["Crew", "OnFailure"]
+
+A = TypeVar("A")
+OnFailure = Literal["fleet", "group", "alone"]
+
+
+class Crew(Generic[A]):
+    """The part of `Fleet` that is not for its users.
+
+    Attributes:
+        failures: Why arms failed, by name, since they were last known to work.
+    """
+
+    def __init__(
+        self,
+        members: Mapping[str, Member[A]],
+        zones: Mapping[str, Shape | None],
+        groups: Mapping[str, OnFailure],
+    ) -> None:
+        self.failures: dict[str, DobotError] = {}
+        self._groups = groups
+        self._zones = Zones(dict(zones), {name: Party(name) for name in members})
+        self._barriers = Barriers()
+        self._seats = {
+            name: Seat(name, member, self._zones, self._fail, self._works) for name, member in members.items()
+        }
+        self._stopping: set[asyncio.Task[None]] = set()
+        self._leaving = False
+
+    @asynccontextmanager
+    async def _connected(self, options: Mapping[str, Any]) -> AsyncIterator[Self]:
+        """Holds all arms, each in a task of its own, for the length of a block."""
+        leave = asyncio.Event()
+        ready = {name: asyncio.get_running_loop().create_future() for name in self._seats}
+        hosts = {
+            asyncio.create_task(host(seat, options, ready[name], leave), name=f"dobot_async {name}")
+            for name, seat in self._seats.items()
+        }
+        try:
+            await all_ready(hosts, ready.values())
+            yield self
+        except BaseException:
+            self._leaving = True
+            await undisturbed(self._close(hosts, stop=True))
+            raise
+
+        self._leaving = True
+        await undisturbed(self._stopped())
+        leave.set()
+        await undisturbed(self._close(hosts, stop=False))
+
+    async def _close(self, hosts: set[asyncio.Task[None]], *, stop: bool) -> None:
+        """Joins all that the fleet has started; with `stop` the arms are left as by an error."""
+        if stop:
+            await end(hosts)
+
+        await self._stopped()
+        await asyncio.wait(hosts)
+        for task in hosts if not stop else ():
+            task.result()
+
+    def _seat(self, name: str) -> Seat:
+        """The place of an arm."""
+        if name not in self._seats:
+            raise KeyError(f"no arm {name!r} in this fleet; there are: {', '.join(self._seats)}")
+
+        return self._seats[name]
+
+    def _affected(self, name: str) -> Collection[str]:
+        """The arms that stop when one fails, itself among them unless it fails alone."""
+        group = self._seats[name].member.group
+        reach = self._groups[group] if group else "fleet"
+        if reach == "alone":
+            return ()
+
+        return [each for each, seat in self._seats.items() if reach == "fleet" or seat.member.group == group]
+
+    def _ends(self, name: str, error: BaseException) -> bool:
+        """Whether a failure in the work of an arm cancels the work of the others."""
+        alone = name in self._seats and len(self._affected(name)) < len(self._seats)
+        return not (alone and isinstance(error, DobotError))
+
+    def _fail(self, failed: Seat, error: DobotError) -> None:
+        """An arm has failed: the others stop, and nobody waits for it any more."""
+        if self._leaving:
+            return
+
+        self.failures[failed.name] = error
+        failed.party.failure = error
+        self._zones.drop(failed.party)
+        self._zones.claims.fail([failed.party], error)
+        self._barriers.fail(failed.name, str(error))
+        for name in self._affected(failed.name):
+            seat = self._seats[name]
+            if seat.stopped:
+                continue
+
+            if seat is failed:
+                seat.stopped = MotionStopped(f"{name} does not move, for it has failed: {error}")
+            else:
+                seat.stopped = MotionStopped(f"{name} was stopped because another arm failed: {error}")
+                seat.queue.fail(seat.stopped)
+                self._zones.claims.fail([seat.party], seat.stopped)
+                task = asyncio.create_task(self._halt(seat), name=f"dobot_async {name} stop")
+                self._stopping.add(task)
+                task.add_done_callback(self._stopping.discard)
+
+    def _works(self, seat: Seat) -> None:
+        """An arm may move, whatever it has failed with before."""
+        if seat.party.failure:
+            seat.party.failure = None
+            self._barriers.join(seat.name)
+            del self.failures[seat.name]
+
+    async def _halt(self, seat: Seat) -> None:
+        """Stops one arm, as far as its link allows."""
+        with suppress(DobotError):
+            await undisturbed(seat.arm.stop())
+
+    async def _stopped(self) -> None:
+        """Returns when the stops that a failure has begun are over."""
+        if self._stopping:
+            await asyncio.wait(self._stopping)
+
+
+async def host(seat: Seat, options: Mapping[str, Any], ready: asyncio.Future[None], leave: asyncio.Event) -> None:
+    """Holds one arm's connection until all are to be left; cancelled, it leaves it as by an error."""
+    member = seat.member
+    try:
+        async with seat.family.kind.connect(member.url, **{**options, **member.options}) as arm:
+            try:
+                await seat.begin(arm)
+                ready.set_result(None)
+                await leave.wait()
+            finally:
+                seat.end()
+    except (DobotError, ValueError) as error:
+        named(seat.name, error)
+        raise
+    finally:
+        await undisturbed(seat.aclose())
+
+
+async def all_ready(hosts: Collection[asyncio.Task[None]], ready: Collection[asyncio.Future[None]]) -> None:
+    """Returns when all arms are connected; raises the first failure."""
+    waiting = set(ready)
+    while waiting:
+        done, _ = await asyncio.wait([*waiting, *hosts], return_when=asyncio.FIRST_COMPLETED)
+        for task in hosts:
+            if task in done:
+                task.result()
+
+        waiting -= done

@@ -1,0 +1,347 @@
+"""Several arms as one: connected together, closed together, and stopped together when one of them fails.
+
+    async with Fleet.connect({"left": url, "right": url}) as fleet:
+        await fleet.each("home")
+        async with fleet.together("left", "right") as together:
+            together["left"].move_to(220, 0, 40)
+            together["right"].move_to(220, 0, 40)
+
+Coordinates are each arm's own; its base frame turns those of the cell into them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator, Mapping
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from pathlib import Path
+from typing import Any, Concatenate, ParamSpec, TypeVar, cast, overload
+
+from dobot_async.errors import DobotError
+from dobot_async.fleet.cell import read_cell
+from dobot_async.fleet.claims import Party
+from dobot_async.fleet.crew import Crew, OnFailure
+from dobot_async.fleet.families import AnyArm
+from dobot_async.fleet.frames import BaseFrame, Place
+from dobot_async.fleet.seat import Member, Seat
+from dobot_async.fleet.shapes import Shape
+from dobot_async.fleet.together import Together, abandon, launch
+from dobot_async.fleet.work import all_of, named, side_by_side
+from dobot_async.fleet.zones import Program, Run, here, running
+from dobot_async.magician.arm import Magician
+from dobot_async.magician.queue import Batch
+from dobot_async.motion import undisturbed
+from dobot_async.mycobot.arm import MyCobot
+from dobot_async.mycobot.queue import CobotBatch
+from dobot_async.ultraarm.arm import UltraArm
+from dobot_async.ultraarm.queue import UltraArmBatch
+
+__all__ = ["Fleet", "OnFailure"]
+
+A = TypeVar("A")
+K = TypeVar("K")
+T = TypeVar("T")
+P = ParamSpec("P")
+
+
+class Fleet(Crew[A]):
+    """Connected arms by name; made by `connect` or `from_file`, for the length of a block.
+
+    Attributes:
+        failures: Why arms failed, by name, since they were last known to work.
+    """
+
+    @overload
+    @classmethod
+    def connect(
+        cls,
+        arms: Mapping[str, str],
+        *,
+        zones: Mapping[str, Shape | None] | None = None,
+        groups: Mapping[str, OnFailure] | None = None,
+        **options: Any,
+    ) -> AbstractAsyncContextManager[Fleet[Magician]]: ...
+
+    @overload
+    @classmethod
+    def connect(
+        cls,
+        arms: Mapping[str, Member[K]],
+        *,
+        zones: Mapping[str, Shape | None] | None = None,
+        groups: Mapping[str, OnFailure] | None = None,
+        **options: Any,
+    ) -> AbstractAsyncContextManager[Fleet[K]]: ...
+
+    @classmethod
+    def connect(
+        cls,
+        arms: Mapping[str, Any],
+        *,
+        zones: Mapping[str, Shape | None] | None = None,
+        groups: Mapping[str, OnFailure] | None = None,
+        **options: Any,
+    ) -> AbstractAsyncContextManager[Fleet[Any]]:
+        """Connects to all arms at the same time, or to none.
+
+        Args:
+            arms: By name: URLs of Magicians, or a Member for each arm.
+            zones: What only one arm at a time may be in, by name; None for a zone that is nowhere in particular.
+            groups: Which arms stop when one of a group fails: those of the "fleet", of the "group", or it "alone".
+            **options: For `connect` of every arm, such as check_reach=True.
+
+        Raises:
+            ValueError: A URL or an argument is wrong.
+            ConnectFailed: An arm did not answer; the message names it.
+        """
+        members = {
+            name: arm if isinstance(arm, Member) else Member(arm, cast("type[Any]", Magician))
+            for name, arm in arms.items()
+        }
+        groups = groups or {}
+        if not members:
+            raise ValueError("a fleet has at least one arm")
+
+        unknown = {member.group for member in members.values() if member.group} - groups.keys()
+        if unknown or not set(groups.values()) <= {"fleet", "group", "alone"}:
+            raise ValueError(
+                f'each group is in groups, with "fleet", "group" or "alone"; not so: {sorted(unknown) or dict(groups)}'
+            )
+
+        fleet = cls(cast(Any, members), zones or {}, groups)
+        return fleet._connected(options)
+
+    @classmethod
+    def from_file(cls, path: str | Path, **options: Any) -> AbstractAsyncContextManager[Fleet[AnyArm]]:
+        """Connects to the arms of a cell file; see docs/fleet.md for what stands in it.
+
+        Args:
+            path: Of the TOML file.
+            **options: For `connect` of every arm.
+
+        Raises:
+            ValueError: The file is wrong; the message says where.
+            OSError: It cannot be read.
+            ConnectFailed: An arm did not answer.
+        """
+        cell = read_cell(Path(path))
+        return cls.connect(cell.members, zones=cell.zones, groups=cell.groups, **options)
+
+    def __getitem__(self, name: str) -> A:
+        return cast(A, self._seat(name).arm)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._seats)
+
+    def __len__(self) -> int:
+        return len(self._seats)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._seats
+
+    def arm(self, name: str, kind: type[K]) -> K:
+        """Returns an arm of a family, typed; raises TypeError if it is of another."""
+        arm = self._seat(name).arm
+        if not isinstance(arm, kind):
+            raise TypeError(f"{name} is a {self._seat(name).member.kind.__name__}, not a {kind.__name__}")
+
+        return arm
+
+    def base(self, name: str) -> BaseFrame:
+        """Returns where an arm stands in the cell."""
+        return self._seat(name).member.base
+
+    def to_cell(self, name: str, x: float, y: float, z: float, r: float = 0.0) -> Place:
+        """Returns where in the cell a place of an arm is."""
+        return self.base(name).to_cell(x, y, z, r)
+
+    def to_arm(self, name: str, x: float, y: float, z: float, r: float = 0.0) -> Place:
+        """Returns what a place of the cell is for an arm."""
+        return self.base(name).to_arm(x, y, z, r)
+
+    @overload
+    async def each(self, verb: str, *args: Any, **kwargs: Any) -> dict[str, Any]: ...
+
+    @overload
+    async def each(
+        self, verb: Callable[Concatenate[A, P], Awaitable[T]], *args: P.args, **kwargs: P.kwargs
+    ) -> dict[str, T]: ...
+
+    async def each(self, verb: Any, *args: Any, **kwargs: Any) -> dict[str, Any]:
+        """Does the same with all arms at the same time, and returns what each has returned.
+
+        Args:
+            verb: The name of a method, or something to call with each arm, such as `Magician.home`.
+            *args: What it takes.
+            **kwargs: What it takes.
+
+        Raises:
+            DobotError: The first failure, with the arm's name; what the others did was cancelled, so that they stop,
+                unless their group goes on.
+        """
+
+        async def done(seat: Seat) -> Any:
+            method = getattr(seat.arm, verb) if isinstance(verb, str) else None
+            try:
+                return await (method(*args, **kwargs) if method else verb(seat.arm, *args, **kwargs))
+            except (DobotError, ValueError) as error:
+                named(seat.name, error)
+                raise
+
+        try:
+            return await side_by_side({name: done(seat) for name, seat in self._seats.items()}, ends=self._ends)
+        finally:
+            await undisturbed(self._stopped())
+
+    async def stop(self) -> None:
+        """Stops all arms, at the same time; pending Motions raise MotionStopped.
+
+        Raises:
+            DobotError: An arm could not be stopped; the others were.
+        """
+        await undisturbed(all_of({name: seat.arm.stop() for name, seat in self._seats.items()}))
+
+    async def recover(self) -> None:
+        """Makes all arms ready again after a failure: clears alarms and queues, and lets them move.
+
+        Raises:
+            DobotError: An arm does not recover; the fleet stays stopped.
+        """
+
+        async def recovered(seat: Seat) -> None:
+            await (seat.arm.recover() if hasattr(seat.arm, "recover") else seat.queue.clear())
+            await seat.locate()
+
+        await self._stopped()
+        await all_of({name: recovered(seat) for name, seat in self._seats.items()})
+        self._barriers.forget()
+        for seat in self._seats.values():
+            seat.stopped = None
+            self._works(seat)
+
+    async def run(self, programs: Mapping[str, Coroutine[Any, Any, T]]) -> dict[str, T]:
+        """Runs programs side by side, and returns what each has returned.
+
+        Args:
+            programs: Coroutines, by the name of the arm that each commands, or by another name.
+
+        Raises:
+            BaseException: The first failure, when all have ended; the others were cancelled, unless the group of the
+                arm that failed lets them go on.
+        """
+        parent, run = here(), Run(frozenset(programs))
+
+        async def ran(name: str, program: Coroutine[Any, Any, T]) -> T:
+            arm = name if name in self._seats else None
+            part = Program(Party(f"program {name}"), asyncio.current_task(), parent, arm, run)
+            if arm:
+                self._zones.drivers[arm] = part.task
+
+            why = "has ended"
+            try:
+                with running(part):
+                    return await program
+            except BaseException as error:
+                why = f"has failed: {error or type(error).__name__}"
+                if arm and isinstance(error, ValueError):
+                    named(name, error)
+
+                raise
+            finally:
+                self._barriers.leave(name, f"{name} {why}", run=run)
+
+        try:
+            return await side_by_side({name: ran(name, each) for name, each in programs.items()}, ends=self._ends)
+        finally:
+            self._barriers.forget(run)
+            await undisturbed(self._stopped())
+
+    async def barrier(self, name: str, *parties: str, timeout: float | None = None) -> None:
+        """Returns when all parties have come to this barrier; it may be passed any number of times.
+
+        Args:
+            name: Of the barrier.
+            parties: Who has to come; by default all programs of the same `run`, outside of one all arms of the fleet.
+            timeout: Seconds to wait.
+
+        Raises:
+            BarrierBroken: One of them failed, ended or gave up; it stays broken for the run, or until `recover`.
+            ReplyTimeout: They did not all come in time.
+        """
+        run = next((each.run for each in here().line() if each.run), None)
+        names = parties or (run.parties if run else self._seats)
+        await self._barriers.wait(name, frozenset(names), run=run, timeout=timeout)
+
+    def zone(self, name: str, *arms: str, timeout: float | None = None) -> AbstractAsyncContextManager[None]:
+        """Holds a zone for the length of a block; nobody else does.
+
+        Args:
+            name: Of the zone.
+            arms: Whose being in the zone is no hindrance. The arm of a program of `run`, and those that this task has
+                moved, need not be named.
+            timeout: Seconds to wait for it.
+
+        Raises:
+            ValueError: There is no such zone.
+            ZoneDeadlock: Its holder waits, in the end, for who asks.
+            ZoneOccupied: An arm that has failed may be in it.
+            ReplyTimeout: It was not free in time.
+            MotionStopped: The fleet was stopped because of a failure while this waited.
+        """
+        for arm in arms:
+            self._seat(arm)
+
+        return self._zones.hold(name, arms, timeout)
+
+    def holders(self, zone: str) -> list[str]:
+        """Returns the names of those who hold a zone."""
+        return [party.name for party in self._zones.claims.holders(zone)]
+
+    @overload
+    def together(
+        self: Fleet[Magician], *names: str, timeout: float | None = None
+    ) -> AbstractAsyncContextManager[Together[Batch]]: ...
+
+    @overload
+    def together(
+        self: Fleet[MyCobot], *names: str, timeout: float | None = None
+    ) -> AbstractAsyncContextManager[Together[CobotBatch]]: ...
+
+    @overload
+    def together(
+        self: Fleet[UltraArm], *names: str, timeout: float | None = None
+    ) -> AbstractAsyncContextManager[Together[UltraArmBatch]]: ...
+
+    @overload
+    def together(self, *names: str, timeout: float | None = None) -> AbstractAsyncContextManager[Together[Any]]: ...
+
+    @asynccontextmanager
+    async def together(self, *names: str, timeout: float | None = None) -> AsyncIterator[Together[Any]]:
+        """Collects a batch for each of several arms, and starts them at one instant when the block ends.
+
+        The arms first finish what they have to do. Motions return as usual; `start` and `skew` of what this yields tell
+        how well it went.
+
+        Args:
+            *names: Of the arms; all by default.
+            timeout: Seconds for the arms to finish what they do, and again for room in their queues.
+
+        Raises:
+            DobotError: The batches could not be loaded or released; the arms were stopped.
+        """
+        seats = {name: self._seat(name) for name in names or self._seats}
+        batches = {name: seat.family.batch(seat.arm) for name, seat in seats.items()}
+        together = Together(batches)
+        try:
+            yield together
+        except BaseException:
+            abandon(batches)
+            raise
+
+        commanded = {name: seat for name, seat in seats.items() if batches[name].motions}
+        if commanded:
+            try:
+                together.start = await launch(commanded, batches, timeout)
+            except BaseException:
+                abandon(batches)
+                raise

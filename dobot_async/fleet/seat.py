@@ -1,0 +1,262 @@
+"""One arm in its fleet: what it may send, what it holds, and what becomes of the fleet when it fails."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager, nullcontext, suppress
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
+
+import anyio
+
+from dobot_async.contract import LinkState
+from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
+from dobot_async.executor import Entry
+from dobot_async.fleet.families import Family, FleetQueue, family_of
+from dobot_async.fleet.frames import BaseFrame
+from dobot_async.fleet.guard import Guard, Mode, Step
+from dobot_async.fleet.shapes import Box
+from dobot_async.fleet.work import named
+from dobot_async.fleet.zones import Zones
+from dobot_async.motion import Motion
+
+__all__ = ["Member", "Seat"]
+
+A = TypeVar("A")
+
+
+@dataclass(frozen=True)
+class Member(Generic[A]):
+    """An arm that is to be in a fleet.
+
+    Attributes:
+        url: Where it is.
+        kind: Its class: Magician, MyCobot or UltraArm.
+        options: What `connect` of its class takes beside the URL, such as {"model": "myarm300"}.
+        base: Where it stands in the cell.
+        group: The name of its group; None for the whole fleet.
+        guard: "wait" lets its motions wait for zones that others hold, "raise" refuses them, "off" looks at none.
+        clearance: mm around the tool that have to stay out of such zones.
+        limits: Where in the cell its tool may be at all; None leaves it to the arm.
+    """
+
+    url: str
+    kind: type[A]
+    options: Mapping[str, Any] = field(default_factory=dict)
+    base: BaseFrame = field(default_factory=BaseFrame)
+    group: str | None = None
+    guard: Mode = "off"
+    clearance: float = 0.0
+    limits: Box | None = None
+
+    def __post_init__(self) -> None:
+        family = family_of(self.kind)
+        if self.guard not in {"off", "wait", "raise"} or not self.clearance >= 0:
+            raise ValueError('expected guard "off", "wait" or "raise", and clearance >= 0')
+
+        if self.limits and (family.name != "magician" or self.guard == "off"):
+            raise ValueError("limits are kept by the guard, and of a Magician alone: the ways of others are not known")
+
+
+class Seat:
+    """The place of one arm in its fleet; the `Overseer` of its queue.
+
+    Attributes:
+        name: The arm's.
+        member: What it is.
+        family: Its family.
+        party: As what it holds zones.
+        arm: The arm, once it is connected.
+        stopped: Why it may not move; None while all is well.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        member: Member[Any],
+        zones: Zones,
+        failed: Callable[[Seat, DobotError], None],
+        works: Callable[[Seat], None],
+    ) -> None:
+        self.name = name
+        self.member = member
+        self.family: Family = family_of(member.kind)
+        self.party = zones.arms[name]
+        self.arm: Any = None
+        self.stopped: DobotError | None = None
+        self._zones = zones
+        self._failed = failed
+        self._works = works
+        self._guard: Guard | None = None
+        self._steps: deque[Step] = deque()
+        self._order = anyio.Lock(fast_acquire=True)
+        self._halts = 0
+        self._halted: DobotError = MotionStopped("the arm was stopped")
+        self._quiet = False
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._follower: asyncio.Task[None] | None = None
+
+    @property
+    def queue(self) -> FleetQueue:
+        """The arm's queue."""
+        queue = self.arm.queue
+        assert isinstance(queue, FleetQueue)
+        return queue
+
+    async def begin(self, arm: Any) -> None:
+        """Takes an arm that was just connected."""
+        self.arm = arm
+        member = self.member
+        if member.guard != "off":
+            self._guard = Guard(
+                self._steps,
+                arm,
+                self.family,
+                self._zones,
+                self.party,
+                base=member.base,
+                mode=member.guard,
+                clearance=member.clearance,
+                limits=member.limits,
+            )
+            await self._guard.locate()
+            self._zones.guards.append(self._guard.catch_up)
+
+        self.queue.overseer = self
+        self._spawn(self._watch(), "watcher")
+
+    def end(self) -> set[asyncio.Task[None]]:
+        """Leaves the arm to itself; returns the tasks that end because of it."""
+        if self.arm:
+            self.queue.overseer = None
+
+        for task in self._tasks:
+            task.cancel()
+
+        return set(self._tasks)
+
+    @asynccontextmanager
+    async def admitted(self, batch: Mapping[Entry, Motion], timeout: float | None) -> AsyncIterator[float | None]:
+        """While this is entered, a batch may be sent. Yields the seconds that are left for it."""
+        loop = asyncio.get_running_loop()
+        deadline = None if timeout is None else loop.time() + timeout
+        try:
+            await self._admit(batch, deadline)
+        except BaseException as error:
+            reason = error if isinstance(error, DobotError) else MotionStopped(f"it was not sent: {error}")
+            for motion in batch.values():
+                motion.end(reason)
+
+            raise
+
+        try:
+            yield None if deadline is None else max(0.0, deadline - loop.time())
+        finally:
+            self._order.release()
+            self.follow()
+
+    @asynccontextmanager
+    async def roaming(self) -> AsyncIterator[None]:
+        """While this is entered, the arm may go anywhere."""
+        self.check()
+        async with self._order, self._guard.roaming() if self._guard else nullcontext():
+            yield
+
+    def ended(self, error: DobotError) -> None:
+        """Takes note of what ends all motions of the arm; whatever is no stop is a failure."""
+        self._halts += 1
+        self._halted = error
+        if self._guard:
+            self._guard.unsure()
+
+        self._zones.claims.interrupt(self.party, error)
+        if not isinstance(error, MotionStopped):
+            named(self.name, error)
+            self._failed(self, error)
+
+    def check(self, halts: int | None = None) -> None:
+        """Raises MotionStopped if the arm may not move, and the reason of its last stop if it had fewer before."""
+        if self.stopped:
+            raise MotionStopped(f"{self.stopped}; the fleet stays stopped until fleet.recover()")
+
+        if halts is not None and halts != self._halts:
+            raise self._halted.with_traceback(None)
+
+    def quiet(self, quiet: bool) -> None:
+        """Says whether the arm is to be left alone for now, although it has motions that nobody awaits."""
+        self._quiet = quiet
+        self.follow()
+
+    async def locate(self) -> None:
+        """Finds out anew which zones the arm is in."""
+        if self._guard:
+            await self._guard.locate()
+
+    async def aclose(self) -> None:
+        """Joins what `end` has cancelled."""
+        if self._tasks:
+            await asyncio.wait(self._tasks)
+
+    def follow(self) -> None:
+        """Watches motions to their end, though nobody may await them: an arm that fails is to stop the others."""
+        if self._steps and not self._quiet and (self._follower is None or self._follower.done()):
+            self._follower = self._spawn(self._follow(), "follower")
+
+    async def _admit(self, batch: Mapping[Entry, Motion], deadline: float | None) -> None:
+        """Takes the lock of the order, and returns when the batch may be sent."""
+        self.check()
+        halts = self._halts
+        try:
+            async with asyncio.timeout_at(deadline):
+                await self._order.acquire()
+        except TimeoutError:
+            raise ReplyTimeout(f"{self.name}: others were before it, and took too long") from None
+
+        try:
+            if self._guard:
+                await self._guard.admit(batch, deadline)
+            else:
+                self._steps.extend(Step(motion) for motion in batch.values())
+
+            self.check(halts)
+        except BaseException:
+            self._order.release()
+            self.follow()
+            raise
+
+        self._works(self)
+
+    async def _follow(self) -> None:
+        """Takes the steps as their motions end."""
+        while self._steps and not self._quiet:
+            step = self._steps[0]
+            with suppress(DobotError):
+                await step.motion
+
+            if self._guard:
+                await self._guard.catch_up()
+            elif step in self._steps:
+                self._steps.remove(step)
+
+    async def _watch(self) -> None:
+        """Tells the fleet when the link is lost."""
+        link = self.arm.link
+        changes = aiter(link.state)
+        state = link.state.value
+        while state is not LinkState.LOST:
+            try:
+                state = await anext(changes)
+            except StopAsyncIteration:
+                return
+
+        error = ConnectionLost(f"{self.name}: the connection to {link.url} was lost")
+        self.ended(error)
+
+    def _spawn(self, work: Any, what: str) -> asyncio.Task[None]:
+        """Starts a task that ends with the seat."""
+        task: asyncio.Task[None] = asyncio.create_task(work, name=f"dobot_async {self.name} {what}")
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task

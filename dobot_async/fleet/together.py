@@ -1,0 +1,180 @@
+"""Batches on several arms that start at one instant.
+
+    join what they do --> measure each link --> pause --> load --> release each, earlier by what its link takes --> skew
+
+An arm begins about half a round trip after its release was sent, and tells so half a round trip later. So the releases
+are sent half a round trip before the common instant, and the start that is reported lies in the middle between release
+and answer; `uncertainty` is how far it may be off.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import statistics
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any, Generic, TypeVar
+
+from dobot_async.errors import DobotError, MotionStopped
+from dobot_async.fleet.seat import Seat
+from dobot_async.fleet.work import all_of, side_by_side
+from dobot_async.motion import undisturbed
+
+__all__ = ["Start", "Together"]
+
+B = TypeVar("B")
+SAMPLES = 7
+LEAD = 0.003  # seconds from the decision to the first release, for all to be ready to send
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """How well several arms started together, as their links tell.
+
+    Attributes:
+        at: When each arm started, in the loop's seconds.
+        latency: Seconds that a release takes to each arm, as measured before.
+        uncertainty: Seconds by which a start may be off.
+    """
+
+    at: Mapping[str, float]
+    latency: Mapping[str, float]
+    uncertainty: float
+
+    @property
+    def skew(self) -> float:
+        """Seconds between the first and the last start."""
+        return max(self.at.values()) - min(self.at.values())
+
+
+@dataclass(eq=False)
+class Together(Generic[B]):
+    """The batches of several arms, by name; each verb returns its Motion, to be awaited after the block.
+
+    Attributes:
+        start: How they started, once the block has ended.
+    """
+
+    batches: Mapping[str, B]
+    start: Start | None = field(default=None)
+
+    def __getitem__(self, name: str) -> B:
+        return self.batches[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.batches)
+
+    def __len__(self) -> int:
+        return len(self.batches)
+
+    @property
+    def skew(self) -> float:
+        """Seconds between the first and the last start.
+
+        Raises:
+            RuntimeError: The block has not ended yet.
+        """
+        if self.start is None:
+            raise RuntimeError("the arms start when the block ends")
+
+        return self.start.skew
+
+    async def wait(self) -> None:
+        """Returns when all motions are done; raises the first failure when all have ended."""
+        await side_by_side(
+            {name: wait_for(batch) for name, batch in self.batches.items()}, ends=lambda _name, _error: False
+        )
+
+
+async def wait_for(batch: Any) -> None:
+    """Waits for all motions of a batch."""
+    for motion in list(batch.motions.values()):
+        await motion
+
+
+def abandon(batches: Mapping[str, Any]) -> None:
+    """Ends the Motions of batches that were not sent."""
+    for batch in batches.values():
+        for motion in batch.motions.values():
+            motion.end(MotionStopped("it was not sent: the block that starts the arms together was left by an error"))
+
+
+async def launch(seats: Mapping[str, Seat], batches: Mapping[str, Any], timeout: float | None) -> Start:
+    """Loads batches, and starts them at one instant; a failure or a cancellation lets none of them go on.
+
+    Raises:
+        DobotError: As `put_all` does; the arms were stopped.
+    """
+    for seat in seats.values():
+        seat.check()
+
+    await side_by_side({name: seat.queue.join(timeout) for name, seat in seats.items()})
+    latency = await side_by_side({name: measure(seat) for name, seat in seats.items()})
+    first, rest = {}, {}
+    for seat in seats.values():
+        seat.quiet(True)
+
+    try:
+        await side_by_side({name: seat.queue.pause() for name, seat in seats.items() if seat.family.pauses})
+        for name, seat in seats.items():
+            motions = batches[name].motions
+            room = await seat.family.room(seat.arm) if seat.family.pauses else 1
+            first[name] = dict(islice(motions.items(), max(1, room - 1)))
+            rest[name] = dict(islice(motions.items(), len(first[name]), None))
+
+        pausing = {name: seat for name, seat in seats.items() if seat.family.pauses}
+        await side_by_side({name: seat.queue.put_all(first[name], timeout=timeout) for name, seat in pausing.items()})
+        instant = asyncio.get_running_loop().time() + LEAD + max(latency.values())
+        told = await side_by_side(
+            {name: release(seat, instant - latency[name], first[name]) for name, seat in seats.items()}
+        )
+    except BaseException:
+        await undisturbed(give_up(seats))
+        raise
+    finally:
+        for seat in seats.values():
+            seat.quiet(False)
+
+    more = {name: seat for name, seat in seats.items() if rest[name]}
+    await side_by_side({name: seat.queue.put_all(rest[name], timeout=timeout) for name, seat in more.items()})
+    at = {name: (sent + answered) / 2 for name, (sent, answered) in told.items()}
+    return Start(at, latency, max(answered - sent for sent, answered in told.values()) / 2)
+
+
+async def measure(seat: Seat) -> float:
+    """Returns how many seconds a message takes to an arm: half of a typical round trip."""
+    loop = asyncio.get_running_loop()
+    trips = []
+    for _ in range(SAMPLES):
+        asked = loop.time()
+        await seat.family.ask(seat.arm)
+        trips.append(loop.time() - asked)
+
+    return statistics.median(trips) / 2
+
+
+async def release(seat: Seat, when: float, motions: Mapping[Any, Any]) -> tuple[float, float]:
+    """Starts one arm at a time; returns when that was sent, and when it was answered."""
+    loop = asyncio.get_running_loop()
+    due: asyncio.Future[None] = loop.create_future()
+    timer = loop.call_at(when, due.set_result, None)
+    try:
+        await due
+        sent = loop.time()
+        if seat.family.pauses:
+            await seat.queue.resume()
+        else:
+            await seat.queue.put_all(motions)
+    finally:
+        timer.cancel()
+
+    return sent, loop.time()
+
+
+async def give_up(seats: Mapping[str, Seat]) -> None:
+    """Stops arms that were to start, so that what was loaded does not run later."""
+    try:
+        await all_of({name: seat.arm.stop() for name, seat in seats.items()})
+    except DobotError:
+        return

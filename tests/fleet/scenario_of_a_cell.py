@@ -1,0 +1,255 @@
+"""One seed is one run of a cell: five guarded arms, zones, barriers and faults, on a virtual clock.
+
+    python tests/fleet/scenario_of_a_cell.py FIRST LAST     runs those seeds, and prints which of them fail
+
+What must hold in each run: no two tools are ever in one zone, nobody hangs, no zone is held for ever, and all arms
+stand still soon after one has failed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import sys
+import warnings
+from collections.abc import Coroutine, Iterator
+from contextlib import AsyncExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
+from random import Random
+from typing import Any
+
+import async_solipsism
+
+from dobot_async import ConnectionLost, DobotError, Fleet, Magician, PTPMode
+from dobot_async.fleet import BaseFrame, Box, Cylinder, Member
+from dobot_async.fleet.shapes import Shape
+from dobot_async.simulator import Faults, Simulation, simulate
+
+__all__ = ["Violation", "run_seed"]
+
+ZONES: dict[str, Shape | None] = {
+    "low": Box(x=(200, 260), y=(-30, 30), z=(0, 70)),
+    "side": Cylinder(180, 150, 35, z=(0, 90)),
+    "high": Box(x=(200, 240), y=(-120, -60), z=(40, 120)),
+    "turn": None,
+}
+"""The arms stand so near to each other that all zones are in the reach of each."""
+
+PLACES = [(230, 0, 20), (230, 0, 60), (180, 150, 40), (200, 120, 60), (220, -90, 60), (220, -90, 20), (190, -60, 60)]
+MODES = [PTPMode.MOVJ_XYZ, PTPMode.MOVL_XYZ, PTPMode.JUMP_XYZ, PTPMode.JUMP_MOVL_XYZ]
+AWAY = (150, -190, 60)
+NAMES = "abcde"
+LONG = 2000.0  # virtual seconds after which somebody hangs
+STANDING = 1.0  # virtual seconds after a failure until everybody stands still
+TICK = 0.01
+WALL = 60
+TRIES = 20
+
+
+class Violation(AssertionError):
+    """What must hold does not."""
+
+
+@dataclass
+class Run:
+    """A run under way."""
+
+    random: Random
+    sims: dict[str, Simulation]
+    fleet: Fleet[Magician]
+    steps: int
+    meets: bool
+    seen: list[str] = field(default_factory=list)
+
+    async def play(self) -> None:
+        """Runs all programs under the eyes of an observer."""
+        watching = asyncio.create_task(self.observe())
+        striking = asyncio.create_task(self.strike())
+        try:
+            async with asyncio.timeout(LONG):
+                with suppress(DobotError):
+                    await self.fleet.run({name: self.program(name, Random(self.random.random())) for name in NAMES})
+        except TimeoutError:
+            raise Violation(f"somebody hangs; held: {self.held()}") from None
+        finally:
+            for task in (watching, striking):
+                task.cancel()
+
+            await asyncio.wait([watching, striking])
+
+        if not watching.cancelled():
+            watching.result()
+
+        if self.fleet.failures:
+            await asyncio.sleep(STANDING)
+            moving = [
+                name
+                for name, sim in self.sims.items()
+                if sim.arm.device.executing and not isinstance(self.fleet.failures.get(name), ConnectionLost)
+            ]
+            if moving:
+                raise Violation(f"{moving} go on although {list(self.fleet.failures)} failed")
+
+        held = [party for party in self.held().get("turn", []) if party]
+        if held:
+            raise Violation(f"turn is held by {held} though all programs have ended")
+
+    async def program(self, name: str, random: Random) -> None:
+        """Moves about, in and out of zones, and meets the others; a deadlock makes it give way."""
+        for step in range(self.steps):
+            try:
+                await self.step(name, random)
+            except DobotError as error:
+                self.seen.append(type(error).__name__)
+                if self.fleet.failures:
+                    raise
+
+                await self.give_way(name)
+
+            if self.meets and step % 3 == 2:
+                await self.give_way(name)
+                await self.fleet.barrier(f"step {step}")
+
+        await self.give_way(name)
+
+    async def give_way(self, name: str) -> None:
+        """Drives out of all zones; raises what it was told if its only way out stays in a deadlock."""
+        for left in reversed(range(TRIES)):
+            try:
+                await self.fleet[name].move_to(*AWAY)
+            except DobotError:
+                if self.fleet.failures or not left:
+                    raise
+
+                await asyncio.sleep(0.3)
+            else:
+                return
+
+    async def step(self, name: str, random: Random) -> None:
+        """One thing that a program does."""
+        arm = self.fleet[name]
+        where, mode, zone = random.choice(PLACES), random.choice(MODES), random.choice(list(ZONES))
+        match random.randrange(6):
+            case 0:
+                async with self.fleet.zone(zone):
+                    await arm.move_to(*where, mode=mode)
+                    await asyncio.sleep(random.random() / 5)
+            case 1:
+                async with arm.queue.batch() as batch:
+                    batch.move_to(*where)
+                    batch.wait(random.random())
+                    batch.move_to(*random.choice(PLACES), mode=mode)
+            case 2:
+                with suppress(TimeoutError):
+                    async with asyncio.timeout(random.random() / 5):
+                        await arm.move_to(*where, mode=mode)
+            case 3:
+                motion = await arm.queue.move_to(*where, mode=mode)
+                await asyncio.sleep(random.random() / 5)
+                await arm.stop()
+                with suppress(DobotError):
+                    await motion
+            case _:
+                await arm.move_to(*where, mode=mode)
+
+    async def strike(self) -> None:
+        """A disaster, in half of the runs."""
+        kind = self.random.choice(["", "", "unplug", "alarm"])
+        await asyncio.sleep(self.random.uniform(0, 6))
+        name = self.random.choice(NAMES)
+        if kind == "unplug":
+            self.sims[name].unplug()
+        elif kind == "alarm":
+            with suppress(DobotError):
+                await self.fleet[name].queue.move_joints(0, 120, 0, 0)
+
+        await asyncio.sleep(LONG)
+
+    async def observe(self) -> None:
+        """Looks at where all tools are, all the time; arms that have failed are nobody's to move any more."""
+        while True:
+            for zone, shape in ZONES.items():
+                inside = [name for name in NAMES if shape and shape.contains(*self.tool(name))]
+                if len(inside) > 1:
+                    raise Violation(f"{inside} are in zone {zone}")
+
+            await asyncio.sleep(TICK)
+
+    def tool(self, name: str) -> tuple[float, float, float]:
+        pose = self.sims[name].arm.pose
+        x, y, z, _ = self.fleet.to_cell(name, pose.x, pose.y, pose.z)
+        return x, y, z
+
+    def held(self) -> dict[str, list[str]]:
+        return {zone: self.fleet.holders(zone) for zone in ZONES}
+
+
+async def run(seed: int) -> list[str]:
+    """Runs a seed; returns what went wrong in it that programs were told of."""
+    random = Random(seed)
+    async with AsyncExitStack() as stack:
+        sims = {}
+        for number, name in enumerate(NAMES):
+            latency, loss = random.choice([0.0, 0.003, 0.02]), random.choice([0.0, 0.0, 0.02])
+            faults = Faults(latency=latency, loss=loss)
+            sims[name] = await stack.enter_async_context(
+                simulate(speed=5, seed=random.randrange(1 << 30), faults=faults)
+            )
+            sims[name].arm.guide_to(150 + 5 * number, -190, 60)
+
+        guard: Any = random.choice(["wait", "wait", "raise"])
+        bases = {name: BaseFrame(*(random.uniform(-10, 10) for _ in range(2))) for name in NAMES}
+        members = {name: Member(sim.url, Magician, base=bases[name], guard=guard) for name, sim in sims.items()}
+        fleet = await stack.enter_async_context(Fleet.connect(members, zones=ZONES))
+        for arm in NAMES:
+            await fleet[arm].set_speed(random.choice([20, 50, 100]))
+
+        under_way = Run(random, sims, fleet, random.randint(3, 9), random.random() < 0.5)
+        await under_way.play()
+        return under_way.seen
+
+
+@contextmanager
+def not_for_ever() -> Iterator[None]:
+    """Fails a run that never ends although its clock is virtual."""
+
+    def end(*_: object) -> None:
+        raise Violation("it never ends")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.alarm(WALL)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def run_seed(seed: int) -> list[str]:
+    """Runs a seed; raises Violation if something does not hold."""
+    seen: list[str] = []
+
+    async def checked(work: Coroutine[Any, Any, list[str]]) -> None:
+        seen.extend(await work)
+        left = asyncio.all_tasks() - {asyncio.current_task()}
+        if left:
+            raise Violation(f"left behind: {left}")
+
+    with not_for_ever(), asyncio.Runner(loop_factory=async_solipsism.EventLoop) as runner:
+        runner.run(checked(run(seed)))
+
+    return seen
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")
+    counts: dict[str, int] = {}
+    for number in range(int(sys.argv[1]), int(sys.argv[2]) + 1):
+        try:
+            for name in run_seed(number):
+                counts[name] = counts.get(name, 0) + 1
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is this seed's
+            sys.stdout.write(f"seed {number}: {type(error).__name__}: {error}\n")
+            sys.stdout.flush()
+
+    sys.stdout.write(f"done; told: {counts}\n")

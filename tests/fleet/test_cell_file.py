@@ -1,0 +1,118 @@
+"""Cell files: what they may say, and what is told of those that are wrong."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from virtual import virtual
+
+from dobot_async import Fleet, Magician, MyCobot, UltraArm
+from dobot_async.fleet import BaseFrame, Box, Cylinder
+from dobot_async.fleet.cell import parse_cell, read_cell
+
+WHOLE = """
+[arms.left]
+url = "sim:?speed=20"
+guard = "wait"
+clearance = 20
+limits = { x = [100, 300] }
+options = { check_reach = true }
+
+[arms.right]
+url = "sim:"
+family = "mycobot"
+model = "myarm300"
+base = { x = 500, yaw = 180 }
+group = "loading"
+
+[arms.third]
+url = "sim:"
+family = "ultraarm"
+
+[groups.loading]
+on_failure = "alone"
+
+[zones.bin]
+box = { x = [1, 2], y = [3, 4], z = [5, 6] }
+
+[zones.feeder]
+cylinder = { x = 200, y = 100, radius = 60 }
+
+[zones.turn]
+"""
+
+
+def test_all_that_a_file_may_say() -> None:
+    cell = parse_cell(WHOLE)
+    left, right, third = cell.members.values()
+    assert (left.kind, right.kind, third.kind) == (Magician, MyCobot, UltraArm)
+    assert (left.guard, left.clearance, left.limits) == ("wait", 20, Box(x=(100, 300)))
+    assert left.options == {"check_reach": True}
+    assert right.options == {"model": "myarm300"}
+    assert right.base == BaseFrame(500, 0, 0, 180)
+    assert (right.group, dict(cell.groups)) == ("loading", {"loading": "alone"})
+    assert cell.zones == {
+        "bin": Box((1, 2), (3, 4), (5, 6)),
+        "feeder": Cylinder(200, 100, 60, (-math.inf, math.inf)),
+        "turn": None,
+    }
+
+
+ARM = '[arms.a]\nurl = "sim:"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "there are no arms"),
+        ("[arms", "at end of document"),
+        ("arms = 1", r"arms: expected tables, such as \[arms.NAME\]"),
+        (f"{ARM}[robots]", "the file has no 'robots'; there are: arms, zones, groups"),
+        ("[arms.a]", r"arms\.a: url: it is missing"),
+        ("[arms.a]\nurl = 1", r"arms\.a: url: expected a text, not 1"),
+        (f"{ARM}speed = 1", r"arms\.a: an arm has no 'speed'"),
+        (f"{ARM}family = 'dobot'", r"arms\.a: family: one of magician, mycobot, ultraarm, not 'dobot'"),
+        (f"{ARM}guard = 'maybe'", r"arms\.a: expected guard"),
+        (f"{ARM}clearance = -1", r"arms\.a: expected guard .* clearance >= 0"),
+        (f"{ARM}clearance = true", r"arms\.a: clearance: expected a number, not True"),
+        (f"{ARM}base = 1", r"arms\.a: base: expected a table"),
+        (f"{ARM}base = {{ roll = 1 }}", r"arms\.a: base: a base has no 'roll'"),
+        (f"{ARM}base = {{ x = nan }}", r"arms\.a: base: a base frame has finite numbers"),
+        (f"{ARM}limits = {{ x = [1, 2] }}", r"arms\.a: limits are kept by the guard"),
+        (f"{ARM}guard = 'wait'\nlimits = {{ x = [2, 1] }}", r"arms\.a: limits: x goes from a lower number"),
+        (f"{ARM}group = 'b'", r"arms\.a\.group: there is no \[groups\.b\]"),
+        (f"{ARM}[groups.b]\non_failure = 'never'", r"groups\.b: on_failure: .* not 'never'"),
+        (f"{ARM}[zones.z]\nsphere = {{}}", r"zones\.z: a zone has no 'sphere'"),
+        (f"{ARM}[zones.z]\nbox = {{}}", r"zones\.z: box: a box has x, y or z"),
+        (f"{ARM}[zones.z]\nbox = {{ x = 1 }}", r"zones\.z: box: x: expected \[lowest, highest\], not 1"),
+        (f"{ARM}[zones.z]\nbox = {{ x = ['a', 1] }}", r"zones\.z: box: x: expected a number, not 'a'"),
+        (f"{ARM}[zones.z]\ncylinder = {{ x = 1, y = 1 }}", r"zones\.z: cylinder: radius: it is missing"),
+        (f"{ARM}[zones.z]\ncylinder = {{}}\nbox = {{}}", r"zones\.z: either a box or a cylinder"),
+    ],
+)
+def test_wrong_files(text: str, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        parse_cell(text)
+
+
+def test_the_message_begins_with_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text("[arms.a]", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"cell\.toml: arms\.a"):
+        read_cell(path)
+
+
+def test_a_fleet_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text('[arms.a]\nurl = "sim:?speed=20"\n[arms.b]\nurl = "sim:?speed=20"\n', encoding="utf-8")
+
+    @virtual
+    async def scene() -> None:
+        async with Fleet.from_file(path, check_reach=True) as fleet:
+            await fleet.arm("a", Magician).move_to(220, 0, 40)
+            with pytest.raises(ValueError, match="too far"):
+                await fleet.each("move_to", 400, 0, 40)
+
+    scene()

@@ -1,0 +1,90 @@
+"""What the tests of Zenoh share: places and sessions that are confined to the loopback interface."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import zenoh
+
+__all__ = ["configured", "connect_to", "endpoint", "keep", "place", "session", "warm_up", "written"]
+
+
+def endpoint(protocol: str = "tcp") -> str:
+    """A free place to listen at."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def place(name: str = "left", **more: str) -> str:
+    """Where a bridge listens."""
+    return f"zenoh://{name}?listen={endpoint()}" + "".join(f"&{option}={value}" for option, value in more.items())
+
+
+def connect_to(url: str) -> str:
+    """The endpoint in a client's URL."""
+    return parse_qs(urlsplit(url).query)["connect"][0]
+
+
+def configured(config: zenoh.Config | None = None, **settings: Any) -> zenoh.Config:
+    """A configuration that looks for nobody; `connect__endpoints` is connect/endpoints."""
+    given = {
+        "mode": "client" if "connect__endpoints" in settings else "peer",
+        "scouting__multicast__enabled": False,
+        "scouting__gossip__enabled": False,
+        "listen__endpoints": [],
+        "transport__shared_memory__enabled": False,
+        **settings,
+    }
+    config = config or zenoh.Config()
+    for key, value in given.items():
+        config.insert_json5(key.replace("__", "/"), json.dumps(value))
+
+    return config
+
+
+@asynccontextmanager
+async def session(url: str = "", **settings: Any) -> AsyncIterator[zenoh.Session]:
+    """A session that knows nothing of arms, connected as a client of an URL would be."""
+    if url:
+        settings["connect__endpoints"] = [connect_to(url)]
+
+    opened = await asyncio.to_thread(zenoh.open, configured(**settings))
+    try:
+        yield opened
+    finally:
+        await asyncio.to_thread(opened.close)
+
+
+def keep(source: zenoh.Session, key: str) -> list[tuple[str, bytes]]:
+    """Everything that is published, from now on."""
+    kept: list[tuple[str, bytes]] = []
+
+    def take(sample: zenoh.Sample) -> None:
+        kept.append((str(sample.key_expr), sample.payload.to_bytes()))
+
+    source.declare_subscriber(key, zenoh.handlers.Callback(take, indirect=False))
+    return kept
+
+
+def warm_up() -> None:
+    """Lets Zenoh open what it keeps as long as the program runs: it is nothing that a test leaves behind."""
+    where = endpoint()
+    with zenoh.open(configured(listen__endpoints=[where])) as one:
+        kept = keep(one, "warm/up")
+        with zenoh.open(configured(connect__endpoints=[where])) as other:
+            while not kept:
+                other.put("warm/up", b"")
+
+
+def written(path: Path, **settings: Any) -> Path:
+    """A configuration file."""
+    path.write_text(str(configured(**settings)), encoding="utf-8")
+    return path
