@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.executor import Entry
 from dobot_async.motion import Motion, MotionQueue, undisturbed
-from dobot_async.transports import Transport, open_transport
+from dobot_async.transports import Transport, hidden, open_transport
 from dobot_async.wire import Command
 
 __all__ = ["Collector", "collected", "open_in_time", "owned"]
@@ -75,9 +75,11 @@ async def collected(queue: MotionQueue, batch: C, timeout: float | None) -> Asyn
 
 
 async def open_in_time(url: str, arm: str, timeout: float) -> Transport:
-    """Opens the way to an arm; raises ConnectFailed if that takes too long."""
+    """Opens the way to an arm; raises ConnectFailed, with the transport's advice, if that takes too long."""
     try:
         async with asyncio.timeout(timeout):
             return await open_transport(url, arm=arm)
-    except TimeoutError:
-        raise ConnectFailed(f"{url} could not be opened within {timeout:.3g} s; is the address right?") from None
+    except TimeoutError as error:
+        # What the transport was about when the time was over may have left advice.
+        why = getattr(error.__cause__, "__notes__", ["is the address right?"])[0]
+        raise ConnectFailed(f"{hidden(url)} could not be opened within {timeout:.3g} s; {why}") from None

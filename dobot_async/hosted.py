@@ -183,8 +183,15 @@ class HostedExecutor:
                 self._waiting.popleft()
                 self._finished = ticket
         except DobotError as error:
-            self._executing, self._error = False, error
+            self._end(error)
         except Exception as error:
             # Whoever awaits a motion must not wait for a feeder that is gone.
-            self._executing, self._error = False, MotionUnknown(f"it cannot be told how the motion ended: {error!r}")
+            self._end(MotionUnknown(f"it cannot be told how the motion ended: {error!r}"))
             raise
+
+    def _end(self, error: DobotError) -> None:
+        """The command that executes has failed; it is not one that was never sent."""
+        if self._executing:
+            self._waiting.popleft()
+
+        self._executing, self._error = False, error

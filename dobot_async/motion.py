@@ -423,6 +423,6 @@ async def undisturbed(work: Coroutine[Any, Any, T]) -> T:
                 cancelled = error
 
     if cancelled:
-        raise cancelled
+        raise cancelled from (None if task.cancelled() else task.exception())
 
     return task.result()

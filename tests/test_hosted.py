@@ -103,6 +103,18 @@ async def test_one_after_the_other() -> None:
 
 
 @virtual
+async def test_what_was_sent_and_has_failed_is_not_unsent() -> None:
+    arm = Arm()
+    await arm.put(ConnectionLost("gone"), 2)
+    await asyncio.sleep(0.5)
+    assert arm.executor.unsent == 1
+    await asyncio.sleep(10)
+    assert arm.hand.begun[1:] == []
+    assert arm.executor.unsent == 1
+    await arm.aclose()
+
+
+@virtual
 async def test_a_failure_ends_what_is_behind_it_and_nothing_before_it() -> None:
     for error in (ArmAlarm("alarm"), CommandRejected("no"), MotionStopped("elsewhere")):
         arm = Arm()

@@ -118,7 +118,8 @@ def cells(found: Found) -> tuple[str, str, str]:
     """The cells of a line."""
     words = [found.description]
     if found.info:
-        words = [found.info.name, found.info.serial_number, f"firmware {found.info.version}", found.description]
+        version = found.info.version and f"firmware {found.info.version}"
+        words = [found.info.name, found.info.serial_number, version, found.description]
     elif found.problem:
         words.append(f"no answer: {found.problem}")
 

@@ -13,7 +13,8 @@ from typing import Any, Literal, Self, TypeVar
 
 import anyio
 
-from dobot_async.errors import ConnectFailed, DobotError, ReplyTimeout
+from dobot_async.errors import ConnectFailed, DobotError
+from dobot_async.family import open_in_time, owned
 from dobot_async.link import Link
 from dobot_async.magician import commands as c
 from dobot_async.magician import frame
@@ -26,7 +27,6 @@ from dobot_async.magician.verbs import Verbs
 from dobot_async.magician.wifi import WiFi
 from dobot_async.motion import undisturbed
 from dobot_async.roundtrip import RoundTrip
-from dobot_async.transports import Transport, hidden, open_transport
 from dobot_async.wire import Command, Queueing
 
 __all__ = ["DeviceInfo", "Jog", "Magician"]
@@ -162,7 +162,7 @@ class Magician(Verbs[Awaitable[None]]):
         round_trip = RoundTrip(floor, ceiling)
         loop = asyncio.get_running_loop()
         deadline = loop.time() + timeout
-        transport = await opened(url, timeout)
+        transport = await open_in_time(url, "magician", timeout)
         link = Link(
             transport,
             frame.Parser(),
@@ -172,7 +172,7 @@ class Magician(Verbs[Awaitable[None]]):
             fences=FENCES,
             read_only=not control,
             round_trip=round_trip,
-            reopen=partial(opened, getattr(transport, "url", url), timeout) if reconnect else None,
+            reopen=partial(open_in_time, getattr(transport, "url", url), "magician", timeout) if reconnect else None,
         )
         arm = cls(link, window=min(window, transport.window), check_reach=check_reach)
         try:
@@ -334,23 +334,9 @@ class Magician(Verbs[Awaitable[None]]):
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Awaitable[None]:
         """Does a command and returns when it is done: a motion through the queue, anything else immediately."""
         if command.queueing is Queueing.ALWAYS:
-            return self._move(command, value, timeout)
+            return owned(self.queue, command, value, timeout)
 
         return self.link.request(command, value, timeout=timeout)
-
-    async def _move(self, command: Command[Q, Any], value: Q, timeout: float | None) -> None:
-        """Queues a motion and waits for its end; it does not outlive the call."""
-        self.queue.prepare(command, value)
-        try:
-            async with asyncio.timeout(timeout):
-                motion = await self.queue.put(command, value)
-                await motion
-        except (TimeoutError, asyncio.CancelledError) as error:
-            await undisturbed(self.queue.stop())
-            if isinstance(error, TimeoutError) and not isinstance(error, DobotError):
-                raise ReplyTimeout(f"{command.name} was not done within {timeout:.3g} s; the arm was stopped") from None
-
-            raise
 
     def _check(self, value: Any) -> None:
         """Raises Unreachable for a target that the arm cannot reach, if it was asked to."""
@@ -382,16 +368,6 @@ class Magician(Verbs[Awaitable[None]]):
     async def _close(self) -> None:
         await self.queue.aclose()
         await self.link.aclose()
-
-
-async def opened(url: str, timeout: float) -> Transport:
-    """Opens the transport in time."""
-    try:
-        async with asyncio.timeout(timeout):
-            return await open_transport(url, arm="magician")
-    except TimeoutError as error:
-        why = getattr(error.__cause__, "__notes__", ["is the address right?"])[0]
-        raise ConnectFailed(f"{hidden(url)} could not be opened within {timeout:.3g} s; {why}") from None
 
 
 def silent(link: Link[frame.Frame]) -> ConnectFailed:

@@ -11,11 +11,13 @@ from typing import Any
 from dobot_async.bridged import Kind, Reading
 from dobot_async.contract import Parser
 from dobot_async.errors import ProtocolError
+from dobot_async.family import open_in_time
 from dobot_async.magician import alarms
 from dobot_async.magician import commands as c
 from dobot_async.magician import frame as f
 from dobot_async.magician.arm import LEAVING
 from dobot_async.magician.frame import Frame
+from dobot_async.transports import Transport
 from dobot_async.wire import Command, Number, Queueing, u64
 
 __all__ = ["BRIDGED", "BridgedMagician", "MagicianWatch"]
@@ -102,6 +104,7 @@ class BridgedMagician:
     model = "magician"
     filler = f.FILLER
     encode = staticmethod(f.request)
+    proves_stop = True
     greeting = f.request(c.GET_END_EFFECTOR_PARAMS, b"", queued=False)
     stopping = tuple(f.request(command, command.request.encode(value), queued=False) for command, value in LEAVING)
     readings = {  # noqa: RUF012 - a table
@@ -116,6 +119,10 @@ class BridgedMagician:
         ),
         "firmware": frozenset({c.SET_DEVICE_SN.id, 160, 161, 162, 163}),
     }
+
+    async def open(self, url: str, timeout: float) -> Transport:
+        """Opens the way to the arm."""
+        return await open_in_time(url, self.model, timeout)
 
     def parser(self) -> Parser[Frame]:
         """Returns a parser for one stream."""
@@ -152,6 +159,10 @@ class BridgedMagician:
             return self.kind(request) is Kind.STOP
 
         return row.repeatable
+
+    def may_be_silent(self, request: Frame) -> bool:  # noqa: ARG002 - it answers everything
+        """Returns False."""
+        return False
 
     def accept(self, request: Frame, reply: Frame) -> Frame:
         """Returns the reply; raises ProtocolError if it cannot be one to this request."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Awaitable
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any, TypeVar
 
-from dobot_async.errors import MotionStopped
 from dobot_async.executor import Entry
+from dobot_async.family import Collector, collected
 from dobot_async.magician.executor import MagicianExecutor
 from dobot_async.magician.verbs import Verbs
 from dobot_async.motion import Motion, MotionQueue
@@ -29,8 +29,7 @@ class MagicianQueue(MotionQueue, Verbs[Awaitable[Motion]]):
         """Queues a command; see `put`."""
         return self.put(command, value, timeout=timeout)
 
-    @asynccontextmanager
-    async def batch(self, *, timeout: float | None = None) -> AsyncIterator[Batch]:
+    def batch(self, *, timeout: float | None = None) -> AbstractAsyncContextManager[Batch]:
         """Collects commands, and queues them with nothing between them when the block ends; an error sends none.
 
         Args:
@@ -39,16 +38,7 @@ class MagicianQueue(MotionQueue, Verbs[Awaitable[Motion]]):
         Raises:
             DobotError: As `put`; what was accepted before that is pending.
         """
-        batch = Batch(self)
-        try:
-            yield batch
-        except BaseException:
-            for motion in batch.motions.values():
-                motion.end(MotionStopped("it was not sent: its batch was left by an error"))
-
-            raise
-
-        await self.put_all(batch.motions, timeout=timeout)
+        return collected(self, Batch(self), timeout)
 
     @asynccontextmanager
     async def download(self, *, loops: int = 1) -> AsyncIterator[Program]:
@@ -63,25 +53,8 @@ class MagicianQueue(MotionQueue, Verbs[Awaitable[Motion]]):
             await self._arm.download(program.entries, loops)
 
 
-class Batch(Verbs[Motion]):
+class Batch(Collector, Verbs[Motion]):
     """Commands that are sent together; each verb returns its Motion, which may be awaited after the batch's block."""
-
-    def __init__(self, queue: MotionQueue) -> None:
-        self.motions: dict[Entry, Motion] = {}
-        self._queue = queue
-
-    def put(self, command: Command[Q, Any], value: Q) -> Motion:
-        """Adds any row of the table that may be queued."""
-        entry = self._queue.prepare(command, value)
-        motion = self.motions[entry] = Motion(self._queue, entry)
-        return motion
-
-    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Motion:
-        """Adds a command."""
-        if timeout is not None:
-            raise ValueError("the commands of a batch have no timeout of their own; give it to batch()")
-
-        return self.put(command, value)
 
 
 class Program(Verbs[None]):

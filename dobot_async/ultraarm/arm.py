@@ -17,7 +17,7 @@ from dobot_async.family import open_in_time, owned
 from dobot_async.link import Link
 from dobot_async.motion import undisturbed
 from dobot_async.roundtrip import RoundTrip
-from dobot_async.transports import Transport
+from dobot_async.transports import Transport, hidden
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.executor import UltraArmExecutor
 from dobot_async.ultraarm.frame import Frame, Parser, encode
@@ -317,7 +317,7 @@ async def opened(url: str, timeout: float) -> Transport:
     if transport.disorder:
         await transport.aclose()
         raise ValueError(
-            f"{url!r}: an ultraArm needs a link that neither doubles nor reorders, such as serial: or tcp:"
+            f"{hidden(url)!r}: an ultraArm needs a link that neither doubles nor reorders, such as serial: or tcp:"
         )
 
     transport.in_flight = transport.window = 1
