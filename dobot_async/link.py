@@ -1,8 +1,8 @@
 """The link: a transport, a parser and those who wait, held together by one reading task.
 
     request, post --> Turns --> transport.send       at most `in_flight` requests unanswered, one of each key;
-        ^                                            immediate before queued, urgent ones pass everybody
-        |
+        ^                                            urgent ones pass everybody. Queued commands have a window of
+        |                                            their own, and wait for a turn where only one may be under way
     Pending  <-- Parser.feed <-- transport.receive   the reading task
 
 There is one door of death: whatever breaks first is kept as the cause, everybody who waits hears of it once, and every

@@ -209,6 +209,7 @@ class Pending(Generic[F]):
 
     def leave(self, waiter: Waiter[F]) -> None:
         """Nobody waits any more; what is owed stays in line, if it needs to."""
+        waiter.give_up()
         waiter.deliver = None
         line = self._lines.get(waiter.key)
         if line is None:

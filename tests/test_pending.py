@@ -915,3 +915,13 @@ def test_without_proof_in_time_what_came_counts_for_what_was_asked_first(pending
     waiter.give_up()
     assert heard == []
     assert pending.haunted(waiter), "it may have been the straggler, or not"
+
+
+def test_who_leaves_while_replies_are_held_back_holds_back_nobody_elses(pending: Pending[Reply], clock: Clock) -> None:
+    waiter, heard = haunted(pending, clock)
+    pending.resolve(Reply("pose", 1))
+    waiter.__exit__()
+    assert len(pending) == 1
+    pending.resolve(Reply("pose", 0))
+    assert heard == []
+    assert len(pending) == 0
