@@ -202,6 +202,9 @@ class Pending(Generic[F]):
 
     def enter(self, waiter: Waiter[F]) -> None:
         """A request goes out now; its reply is awaited behind those of its key that went out before."""
+        for other in {sent.waiter for sent in self._lines.get(waiter.key, ())} - {waiter}:
+            other.give_up()  # a reply to this one would count for it: nothing can be proven any more
+
         now = self.clock()
         until = now + self.linger
         sent = Sent(waiter, next(self._numbers), now, until, until)

@@ -925,3 +925,15 @@ def test_who_leaves_while_replies_are_held_back_holds_back_nobody_elses(pending:
     pending.resolve(Reply("pose", 0))
     assert heard == []
     assert len(pending) == 0
+
+
+def test_a_second_call_of_the_same_command_ends_the_proof_of_the_first(pending: Pending[Reply], clock: Clock) -> None:
+    """Else the first would hold back the replies to the second, which would be asked again and again."""
+    first, heard_first = haunted(pending, clock)
+    pending.resolve(Reply("pose", 1))
+    _, heard_second = ask(pending, repeatable=True)
+    assert first.held is None
+    pending.resolve(Reply("pose", 2))
+    assert (heard_first, heard_second) == ([2], [])
+    pending.resolve(Reply("pose", 3))
+    assert heard_second == [3]
