@@ -40,7 +40,7 @@ class SerialPorts:
         self._families = families
         self._ports = ports or list_ports
 
-    async def search(self, timeout: float) -> AsyncGenerator[Found, None]:  # noqa: ARG002
+    async def search(self, timeout: float) -> AsyncGenerator[Found, None]:  # noqa: ARG002 - the system knows its ports at once
         """Yields each port with an arm's USB id; one that two drivers show is one port."""
         for port in await to_thread.run_sync(self._ports, abandon_on_cancel=True):
             families = tuple(family.name for family in self._families if (port.vid, port.pid) in family.usb)

@@ -87,7 +87,7 @@ class Simulation:
         *,
         ordered: bool,
         hold: Callable[[bool], None] | None = None,  # noqa: ARG002 - an arm is never too slow for its line
-        name: str = "",  # noqa: ARG002
+        name: str = "",  # noqa: ARG002 - and tells of nobody
     ) -> Client:
         """Called by an endpoint: somebody has connected, and takes replies by `deliver`."""
         client = Client(self.arm.session, self.faults, self._random, deliver, hang_up, ordered=ordered)

@@ -208,8 +208,8 @@ class Palletizer:
         near: Sequence[float],  # noqa: ARG002 - there is one way, with the elbow up
         limits: Ranges,
         *,
-        locked: int | None = None,  # noqa: ARG002
-        seeds: bool = True,  # noqa: ARG002
+        locked: int | None = None,  # noqa: ARG002 - nor is there a joint to spare,
+        seeds: bool = True,  # noqa: ARG002 - or anything to search for
     ) -> Vector | None:
         """Returns the joints that reach a point; None if it is out of reach."""
         x, y, z, turn = point

@@ -52,7 +52,7 @@ PAUSES = (0.1, 0.5, 1.0)
 BUFFER = 1 << 16
 
 
-async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001
+async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
     """Opens `ble://NAME`, `ble://ADDRESS` or `ble:`, with `?pace=` and, on Linux, `?adapter=hci1`."""
     given = options(url, {"pace": float, "adapter": str})
     text = unquote(url.netloc + url.path)

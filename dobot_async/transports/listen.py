@@ -124,7 +124,7 @@ class Connection(asyncio.Protocol, Generic[P]):
         self._full = False
         self._flow()
 
-    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - it does not matter why
         """It has gone."""
         self._host.leave(self._client)
 

@@ -24,7 +24,7 @@ TOKEN_LINE = b"TOKEN %s\n"
 SYSTEM = "system"
 
 
-async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001
+async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
     """Opens `udp://host[:8899]` or `tcp://host:port`.
 
     Both take `?token=`, which a bridge asks for. `?disorder=` says if a network is worse than `DISORDER`; `?ca=` turns

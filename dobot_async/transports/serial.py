@@ -31,7 +31,7 @@ POLL = 0.005
 BUFFER = 1 << 16
 
 
-async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001
+async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
     """Opens `serial:///dev/ttyUSB0` or `serial://COM3`, with `?baud=` if it is not 115200."""
     path = url.netloc + url.path
     baud = options(url, {"baud": int}).get("baud", BAUD)

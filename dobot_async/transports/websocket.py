@@ -21,7 +21,7 @@ CLOSE = 1.0
 UNAUTHORIZED = 401
 
 
-async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001
+async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
     """Opens `ws://host:port` or `wss://host:port`; both take `?token=`, and wss `?ca=` as tcp does."""
     known: dict[str, Any] = {"token": secret, "ca": str} if url.scheme == "wss" else {"token": secret}
     given = options(url, known)

@@ -10,7 +10,7 @@ import math
 import operator
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from dobot_async.errors import ProtocolError
@@ -95,9 +95,10 @@ class Words(Generic[T]):
     """
 
     def __init__(self, kind: type[T]) -> None:
+        assert is_dataclass(kind)
         self.kind = kind
         hints = get_type_hints(kind, include_extras=True)
-        self.fields = [field_of(each.name, hints[each.name]) for each in fields(kind)]  # type: ignore[arg-type]
+        self.fields = [field_of(each.name, hints[each.name]) for each in fields(kind)]
 
     def encode(self, value: T) -> bytes:
         """Returns the words, each after a blank."""
@@ -275,7 +276,8 @@ class Numbers(Bracket[T]):
     """A dataclass of numbers in brackets, in its order; of what the arm adds behind them nothing is read."""
 
     def __init__(self, keyword: str, kind: type[T], convert: Callable[[str], Any] = float) -> None:
-        names = [each.name for each in fields(kind)]  # type: ignore[arg-type]
+        assert is_dataclass(kind)
+        names = [each.name for each in fields(kind)]
 
         def read(texts: list[str]) -> T:
             values = [convert(text) for text in texts[: len(names)]]
