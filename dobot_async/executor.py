@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -45,8 +45,12 @@ class Executor(Protocol):
             TypeError: They are of the wrong type.
         """
 
+    @property
+    def room(self) -> int:
+        """How many commands the arm's queue can take for certain; 0 where only `left_space` tells."""
+
     async def left_space(self) -> int:
-        """Returns how many commands the arm's queue can still take."""
+        """Returns how many commands the arm's queue can still take, which is then its `room`."""
 
     distress: Callable[[MotionUnknown], None]
     """Set by the queue: called when a motion turns out to be unknown while nobody asks."""
@@ -55,11 +59,12 @@ class Executor(Protocol):
     def under_way(self) -> Collection[Entry]:
         """The commands that were sent and of which nobody knows yet whether the arm took them."""
 
-    async def push(self, entries: Sequence[Entry], accepted: Accepted) -> None:
+    async def push(self, entries: Iterator[Entry], accepted: Accepted) -> None:
         """Gives commands to the arm, each exactly once and in order, and calls `accepted` for each one.
 
-        It returns before all are accepted if the arm did not take them; they may be pushed again. Interrupted, it
-        leaves commands `under_way`, which `settle` or the next `push` settles first.
+        It takes an entry when it can send it, and returns when there are no more, when there is no room, or when the
+        arm did not take one; what was not accepted may be pushed again. Interrupted, it leaves commands `under_way`,
+        which `settle` or the next `push` settles first.
 
         Raises:
             MotionUnknown: Nothing can tell whether the arm took a command.
@@ -70,6 +75,9 @@ class Executor(Protocol):
 
     async def completed(self) -> int | None:
         """Returns the ticket of the last command that the arm has finished, None if it cannot say."""
+
+    async def remaining(self, entry: Entry) -> float | None:
+        """Returns seconds within which a command, the next one to be finished, cannot be; None where nothing tells."""
 
     async def faults(self) -> Sequence[object]:
         """Returns the alarms that keep the arm from moving."""

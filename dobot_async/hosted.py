@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from dobot_async.errors import DobotError, MotionUnknown
@@ -84,13 +85,18 @@ class HostedExecutor:
         """Returns a checked entry."""
         return self._hand.prepare(command, value)
 
-    async def left_space(self) -> int:
-        """Returns how many commands can still be taken."""
+    @property
+    def room(self) -> int:
+        """How many commands can still be taken."""
         return self._capacity - len(self._waiting)
 
-    async def push(self, entries: Sequence[Entry], accepted: Accepted) -> None:
+    async def left_space(self) -> int:
+        """Returns the room."""
+        return self.room
+
+    async def push(self, entries: Iterator[Entry], accepted: Accepted) -> None:
         """Takes commands. Behind one that has failed, and of which nobody has heard yet, they fail with it."""
-        for entry in entries:
+        for entry in islice(entries, self.room):
             self._tickets += 1
             self._waiting.append((self._tickets, entry))
             accepted(entry, self._tickets)
@@ -113,6 +119,9 @@ class HostedExecutor:
 
         self._told = self._finished
         return self._finished
+
+    async def remaining(self, entry: Entry) -> None:
+        """Returns None: its end is noticed here."""
 
     async def faults(self) -> Sequence[object]:
         """Returns nothing: a command that alarms have ended is not done."""

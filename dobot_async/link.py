@@ -29,6 +29,7 @@ from dobot_async.pending import SWALLOWED, Pending, Waiter
 from dobot_async.posted import Posted, deliver
 from dobot_async.roundtrip import RoundTrip
 from dobot_async.transports import Transport, hidden
+from dobot_async.transports.base import pump
 from dobot_async.turns import Turns
 from dobot_async.wire import Command
 
@@ -95,7 +96,7 @@ class Link(Generic[F]):
         self._pending: Pending[F] = Pending(self._loop.time, disorder=lambda: self.disorder)
         self._turns = Turns(transport.in_flight)
         self._round_trip = round_trip or RoundTrip()
-        self._sending = anyio.Lock(fast_acquire=True)
+        self._sending = asyncio.Lock()
         self._cause: BaseException | None = None
         self._reader = self._loop.create_task(self._read(), name=f"dobot_async reader {url}")
 
@@ -494,9 +495,7 @@ class Link(Generic[F]):
         try:
             while True:
                 try:
-                    data = await self._transport.receive()
-                    self._arrived_at = self._loop.time()
-                    self._receive(self._parser.feed(data))
+                    await pump(self._transport, self._feed)
                 except BROKEN as error:
                     if not self._reopen:
                         self._end(LinkState.LOST, error.__cause__ or error)
@@ -524,6 +523,11 @@ class Link(Generic[F]):
         self._parser.reset()
         self.outages += 1
         self.state.change(LinkState.OPEN)
+
+    def _feed(self, data: bytes) -> None:
+        """Takes the next bytes of the line."""
+        self._arrived_at = self._loop.time()
+        self._receive(self._parser.feed(data))
 
     def _receive(self, frames: list[F]) -> None:
         """Hands frames to those who wait for them."""

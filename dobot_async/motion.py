@@ -13,6 +13,7 @@ the arm has reached is no proof that the motion succeeded, so the alarms are rea
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import deque
 from collections.abc import AsyncIterator, Collection, Coroutine, Generator, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager, contextmanager
@@ -28,8 +29,9 @@ __all__ = ["Motion", "MotionQueue", "undisturbed"]
 
 T = TypeVar("T")
 Q = TypeVar("Q")
-POLL = 0.003
-ALARM_POLLS = 12  # the alarms are also read at every so many polls, for a motion that an alarm keeps from ending
+POLL = 0.003  # seconds between two looks at an arm of which nothing tells how long it still needs
+DENSE, SELDOM = 0.001, 0.05  # seconds from one look to the next, at the least and at the most
+ALARMS = 0.05  # seconds after which the alarms are read as well, for a motion that an alarm keeps from ending
 REFUSALS = 20  # in a row; each was settled, so that nothing is under way
 
 
@@ -102,7 +104,6 @@ class MotionQueue:
         executor.distress = self._distress
         self._giving_up: set[asyncio.Task[None]] = set()
         self._order = anyio.Lock(fast_acquire=True)
-        self._left = 0
         self._pending: deque[Motion] = deque()
         self._entering: dict[Entry, Motion] = {}
         self._stops = 0
@@ -163,13 +164,10 @@ class MotionQueue:
                         await self._executor.connected()
                         await self._room(stops)
 
-                    sent = len(entries)
-                    await self._executor.push(entries[: self._left], self._accepted)
+                    left = len(entries)
+                    await self._executor.push(self._unsent(entries, stops), self._accepted)
                     entries = [entry for entry in entries if entry in self._entering]
-                    refusals = 0 if len(entries) < sent else refusals + 1
-                    if refusals:
-                        self._left = 0
-
+                    refusals = 0 if len(entries) < left else refusals + 1
                     if refusals == REFUSALS:
                         raise ReplyTimeout(f"the arm answers, but did not take {entries[0].command.name}")
             finally:
@@ -271,7 +269,6 @@ class MotionQueue:
 
             return
 
-        self._left = max(0, self._left - 1)
         if motion:
             motion.index = ticket
             self._pending.append(motion)
@@ -284,15 +281,23 @@ class MotionQueue:
     async def _room(self, stops: int) -> None:
         """Returns when the arm's queue has room: asked only when what was counted down is used up."""
         self._check(stops)
-        while not self._left:
-            self._left = await self._executor.left_space()
+        while not self._executor.room:
+            room = await self._executor.left_space()
             self._check(stops)
-            if not self._left:
+            if not room:
                 self._crowded = True
                 with self.watching():
                     await asyncio.shield(self._observed)
 
                 self._check(stops)
+
+    def _unsent(self, entries: Sequence[Entry], stops: int) -> Iterator[Entry]:
+        """Yields entries until the queue is stopped."""
+        for entry in entries:
+            if self._stops != stops:
+                return
+
+            yield entry
 
     def _refuse(self, error: DobotError) -> None:
         """From now on nothing is sent any more that was put before."""
@@ -312,7 +317,6 @@ class MotionQueue:
                 under_way = list(self._executor.under_way)
                 await self._executor.reset()
                 self._end_all(error, under_way)  # who puts from now on waits for this lock, and goes on
-                self._left = 0
         except DobotError as failure:
             self.fail(failure)
             raise
@@ -334,11 +338,18 @@ class MotionQueue:
 
     async def _poll(self) -> None:
         """Observes the arm while somebody waits."""
-        polls = 0
+        clock = asyncio.get_running_loop().time
+        alarms_at = -math.inf
         while self._watchers:
+            now, pause = clock(), POLL
+            alarms = now >= alarms_at + ALARMS
+            if alarms:
+                alarms_at = now
+
             try:
                 await self._executor.connected()
-                await self._observe(alarms=polls % ALARM_POLLS == 0)
+                await self._observe(alarms=alarms)
+                pause = await self._pause()
             except ReplyTimeout as error:
                 self.fail(ConnectionLost(f"the arm no longer answers: {error}"))
             except MotionUnknown as error:
@@ -346,10 +357,14 @@ class MotionQueue:
             except DobotError as error:
                 self.fail(error)
 
-            polls += 1
             self._crowded = False
             self._tell()
-            await asyncio.sleep(POLL)
+            await asyncio.sleep(max(pause, now + DENSE - clock()))
+
+    async def _pause(self) -> float:
+        """Returns how long the arm may be left alone: half of what the next motion needs at the least."""
+        least = await self._executor.remaining(self._pending[0].entry) if self._pending else None
+        return POLL if least is None else min(least / 2, SELDOM)
 
     async def _observe(self, *, alarms: bool) -> None:
         """Asks the arm how far it is, and ends the Motions that this decides."""

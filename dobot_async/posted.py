@@ -53,8 +53,9 @@ class Posted(Generic[R]):
             ConnectionLost: The link is gone.
         """
         try:
-            async with asyncio.timeout(self._round_trip.timeout):
-                await self._reply
+            if not self._reply.done():
+                async with asyncio.timeout(self._round_trip.timeout):
+                    await self._reply
         except TimeoutError:
             if not self._reply.done() or self._reply.cancelled():
                 self._link.overdue()
@@ -74,6 +75,11 @@ class Posted(Generic[R]):
     def sent_at(self) -> float:
         """When it was sent, in the loop's seconds."""
         return self._waiter.sends[0]
+
+    def answer_with(self, value: R) -> None:
+        """Ends the waiting with a value, if no answer has come: none will."""
+        deliver(self._reply, value)
+        self.forget()
 
     def forget(self) -> None:
         """Stops waiting; may be called again."""

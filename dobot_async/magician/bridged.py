@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from dobot_async.bridged import Kind, Reading
+from dobot_async.bridged import ByKey, Kind, Reading
 from dobot_async.contract import Parser
 from dobot_async.errors import ProtocolError
 from dobot_async.family import open_in_time
@@ -98,7 +98,7 @@ def told_index(reply: Frame) -> dict[str, Any]:
     return {"index": INDEX.decode(reply.params)}
 
 
-class BridgedMagician:
+class BridgedMagician(ByKey[Frame]):
     """See `dobot_async.bridged.Bridged`."""
 
     model = "magician"

@@ -12,8 +12,9 @@ from __future__ import annotations
 import asyncio
 import math
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar, cast
 
 from dobot_async.errors import MotionUnknown, ProtocolError, ReplyTimeout
@@ -21,6 +22,7 @@ from dobot_async.executor import Accepted, Entry
 from dobot_async.link import Link
 from dobot_async.magician import commands as c
 from dobot_async.magician.alarms import Alarm, decode, faults
+from dobot_async.magician.approach import Approach
 from dobot_async.magician.books import Attempt, Books, Verdict
 from dobot_async.magician.frame import Frame
 from dobot_async.magician.reach import destination, is_relative
@@ -32,6 +34,7 @@ __all__ = ["MagicianExecutor", "Surplus"]
 Q = TypeVar("Q")
 R = TypeVar("R")
 INDEX: Number[int] = Number(u64)
+LEFT_SPACE = c.GET_QUEUED_CMD_LEFT_SPACE
 SILENCE = 5.0  # seconds without an answer after which the arm counts as lost, and what is under way as unknown
 GARBAGE = 1 << 32  # an index so far beyond the last one is what some firmware shows while it moves
 SAME_RUN = 0.95  # of the seconds that have passed, the arm's own clock has counted at least so many
@@ -39,6 +42,7 @@ STANDSTILL = 1.0  # seconds between two poses of an arm that shows nonsense for 
 RESTARTED = 0x00  # the alarm that an arm shows from power-up until it is cleared
 PROBES = 60  # in a row, none acknowledged although the arm answers what it is asked
 ARRIVED = 0.5  # mm and degrees
+WARY = 64  # commands that are sent one at a time after one was not acknowledged
 
 
 class Surplus:
@@ -57,37 +61,40 @@ class Surplus:
 
 @dataclass(slots=True)
 class Burst:
-    """Commands that were sent together.
+    """Commands that were sent one behind the other, and what was asked behind the last of them.
 
     Attributes:
-        posted: The commands.
-        complete: Tells, by the time that what was asked behind them is answered, whether they were all acknowledged.
+        posted: The commands that are not known to be answered.
+        size: How many commands.
+        behind: Tells the highest index that was acknowledged by then, and the left space.
     """
 
-    posted: list[Posted[int]] = field(default_factory=list)
-    complete: Posted[bool] | None = None
-
-    @property
-    def acknowledged(self) -> bool:
-        """Whether all of them are."""
-        return all(each.done for each in self.posted)
+    posted: deque[Posted[int]] = field(default_factory=deque)
+    size: int = 0
+    behind: Posted[tuple[int, int]] | None = None
 
     def forget(self) -> None:
         """Stops waiting; may be called again."""
-        for each in (*self.posted, self.complete):
+        for each in (*self.posted, self.behind):
             if each:
                 each.forget()
 
 
 class MagicianExecutor:
-    """The arm's own queue, over a link."""
+    """The arm's own queue, over a link.
+
+    Attributes:
+        room: How many commands it can take for certain, as far as was counted down.
+    """
 
     def __init__(self, link: Link[Frame], window: int, check: Callable[[Any], None]) -> None:
+        self.room = 0
         self.distress: Callable[[MotionUnknown], None] = lambda _: None
         self._link = link
         self._window = window
         self._check = check
         self._books = Books()
+        self._approach = Approach(partial(self._ask, c.GET_POSE), self._now)
         self._heard = -1
         self._completed = -1
         self._cleared = -1
@@ -101,6 +108,7 @@ class MagicianExecutor:
         self._empty = False
         self._verified = False
         self._left = 0
+        self._wary = 0
         self._relative: str | None = None
         self._controlled_at = self._posted_at = self._queued_at = -math.inf
         self._accepted: Accepted = lambda _entry, _ticket: None
@@ -132,11 +140,12 @@ class MagicianExecutor:
         """Returns how many commands the arm's queue can still take; opens the books if it can. Manual 2.19.8."""
         left = await self._read_left()
         if left and self._books.last is None:
-            return left - 1 if await self._open() else 0
+            left = await self._read_left() if await self._open() else 0
 
+        self.room = left
         return left
 
-    async def push(self, entries: Sequence[Entry], accepted: Accepted) -> None:
+    async def push(self, entries: Iterator[Entry], accepted: Accepted) -> None:
         """Queues commands in order, at most `window` unacknowledged; returns early if the arm did not take them all."""
         await self.settle()
         self._accepted = accepted
@@ -144,8 +153,9 @@ class MagicianExecutor:
             return
 
         try:
-            await self._stream(deque(entries))
+            await self._stream(entries)
         except ReplyTimeout:
+            self._wary = WARY
             await self._settle()
 
     async def settle(self) -> None:
@@ -174,6 +184,10 @@ class MagicianExecutor:
 
         return index
 
+    async def remaining(self, entry: Entry) -> float | None:
+        """Returns seconds within which a motion cannot end, as the arm's pose tells. Manual 2.3.1."""
+        return await self._approach.remaining(entry)
+
     async def faults(self) -> Sequence[Alarm]:
         """Returns the alarms that keep the arm from moving. Manual 2.5.1."""
         return faults(await self._alarms())
@@ -185,12 +199,7 @@ class MagicianExecutor:
     async def stands_at(self, entry: Entry) -> bool:
         """Returns whether the arm stands where an absolute motion leads."""
         target = destination(entry.value)
-        if target is None:
-            return False
-
-        pose = await self._ask(c.GET_POSE)
-        here = (pose.j1, pose.j2, pose.j3, pose.j4) if target.joints else (pose.x, pose.y, pose.z, pose.r)
-        return math.dist(here, target.numbers) < ARRIVED
+        return target is not None and target.distance(await self._ask(c.GET_POSE)) < ARRIVED
 
     async def halt(self) -> None:
         """Stops the arm where it is, jogs included, ahead of everything else. Manual 2.19.3 and 2.10.4."""
@@ -210,6 +219,7 @@ class MagicianExecutor:
 
         self._cleared = -1 if self._books.last is None else self._books.last
         self._relative, self._empty = None, True
+        self.room = 0
 
     async def pause(self) -> None:
         """Lets the arm finish the command that it executes, and then wait. Manual 2.19.2."""
@@ -225,8 +235,10 @@ class MagicianExecutor:
         await self.settle()
         await self._link.request(c.SET_QUEUED_CMD_START_DOWNLOAD, c.QueuedCmdStartDownload(loops, len(entries)))
         try:
-            await self.push(entries, lambda _entry, _ticket: None)
+            self.room = len(entries)
+            await self.push(iter(entries), lambda _entry, _ticket: None)
         finally:
+            self.room = 0
             await self._link.request(c.SET_QUEUED_CMD_STOP_DOWNLOAD, None, urgent=True)
 
     async def _control(self, command: Command[None, None]) -> None:
@@ -235,58 +247,76 @@ class MagicianExecutor:
         await self._ask(command, urgent=True)
         self._controlled_at = self._now()
 
-    async def _stream(self, todo: deque[Entry]) -> None:
-        """Sends commands in bursts, one of which is on its way while the one before is acknowledged."""
-        bursts: deque[Burst] = deque()
+    async def _stream(self, entries: Iterator[Entry]) -> None:
+        """Sends commands as there is room, at most `window` of them unacknowledged."""
+        bursts = deque([Burst()])
         try:
-            while todo or bursts:
-                while todo and len(bursts) < min(self._window, 2):
-                    bursts.append(await self._burst(todo))
+            while True:
+                await self._send(entries, bursts)
+                burst = bursts[0]
+                if not burst.posted:
+                    return
 
-                await self._take(bursts[0])
-                bursts.popleft()
+                index = await burst.posted[0].answer()
+                burst.posted.popleft()
+                if not burst.posted and burst is not bursts[-1]:
+                    await self._take(burst, index, sent_since=sum(later.size for later in bursts) - burst.size)
+                    bursts.popleft()
         finally:
             for burst in bursts:
                 burst.forget()
 
-    async def _burst(self, todo: deque[Entry]) -> Burst:
-        """Sends half a window of commands, and something to read behind them.
+    async def _send(self, entries: Iterator[Entry], bursts: deque[Burst]) -> None:
+        """Sends what may be sent now, and behind every window's length something to read."""
+        window = 1 if self._wary else self._window
+        while sum(len(burst.posted) for burst in bursts) < window:
+            burst = bursts[-1]
+            entry = next(entries, None) if self.room else None
+            if entry:
+                await self._verify()
+                burst.posted.append(await self._post(entry))
+                burst.size += 1
 
-        An acknowledgement does not say whose it is: with one command lost, the next one's would pass for it. But what
-        is read behind them is answered behind their own acknowledgements; by then all of those must be there.
+            # Where the room is used up, an answer that is on its way tells of more.
+            if burst.size == window or (burst.size and not entry and (self.room or len(bursts) == 1)):
+                if burst.size > 1 or (window > 1 and not self.room):
+                    burst.behind = await self._ask_behind(burst)
+
+                bursts.append(Burst())
+
+            if not entry:
+                return
+
+    async def _ask_behind(self, burst: Burst) -> Posted[tuple[int, int]]:
+        """Asks for the left space behind a burst.
+
+        An acknowledgement does not say whose it is: with one command lost, the next one's would pass for it. But this
+        is answered behind all of the burst's own: the highest index by then says how many of it the arm took.
         """
-        await self._verify()
-        burst = Burst()
-        try:
-            while todo and len(burst.posted) < max(1, self._window // 2):
-                burst.posted.append(await self._post(todo.popleft()))
 
-            if self._window > 1:
-                behind = self._link.frame(c.GET_QUEUED_CMD_LEFT_SPACE, None)
-                burst.complete = await self._link.post(
-                    behind, lambda _: burst.acknowledged, name="a window of commands", timeout=SILENCE, tombstone=True
-                )
-        except BaseException:
-            burst.forget()
-            raise
+        def accept(frame: Frame) -> tuple[int, int]:
+            left = LEFT_SPACE.reply.decode(frame.params)
+            for each in burst.posted:
+                each.answer_with(self._heard)
 
-        return burst
+            return self._heard, left
 
-    async def _take(self, burst: Burst) -> None:
-        """Enters a burst once all of it is acknowledged."""
-        try:
-            indices = [await each.answer() for each in burst.posted]
-            complete = burst.complete is None or await burst.complete.answer()
-        finally:
-            burst.forget()
+        question = self._link.frame(LEFT_SPACE, None)
+        return await self._link.post(question, accept, name="a window of commands", timeout=SILENCE, tombstone=True)
+
+    async def _take(self, burst: Burst, index: int, *, sent_since: int) -> None:
+        """Enters a burst the last of which got an index; raises ReplyTimeout if that is not true of all of it."""
+        if burst.behind:
+            index, left = await burst.behind.answer()
+            self.room = max(self.room, left - sent_since)
+            if self._books.last is None or index != self._books.last + burst.size:
+                raise ReplyTimeout("some of a window of commands were not acknowledged")
 
         self._queued_at = self._now()
-        if not complete or indices != list(range(indices[0], indices[0] + len(indices))):
-            raise MotionUnknown(f"commands sent together got the indices {indices}: nothing tells which were taken")
-
-        for index in indices:
-            entry, surplus = self._books.acknowledge(index)
-            self._accepted(entry, index)
+        self._wary = max(0, self._wary - burst.size)
+        for each in range(index - burst.size + 1, index + 1):
+            entry, surplus = self._books.acknowledge(each)
+            self._accepted(entry, each)
             self._surplus(surplus)
 
     async def _verify(self) -> None:
@@ -317,6 +347,7 @@ class MagicianExecutor:
 
         def leaving() -> None:
             self._posted_at, self._verified = self._now(), False
+            self.room = max(0, self.room - 1)
             self._books.under_way.append(Attempt(entry, self._posted_at, probe, counted))
             self._empty = False
             if is_relative(entry.value):
@@ -416,7 +447,6 @@ class MagicianExecutor:
 
             if counted is not None and (self._link.disorder or not self._left):
                 # A probe would find no room, or prove nothing: its acknowledgement may be that of its second copy.
-                probes = books.probes
                 verdict = books.conclude(counted)
             else:
                 # What the count has found was acknowledged before the probe: if that comes now, it is late.
@@ -428,23 +458,22 @@ class MagicianExecutor:
                 if books is not self._books:
                     break  # somebody else found out meanwhile that the arm was switched off and on
 
-                probes = books.probes
                 verdict = books.prove(index, exact=not self._link.disorder)
 
             if verdict is None:
                 raise MotionUnknown(f"the arm took some and lost some, and nothing tells which, of {names}")
 
-            return self._enter(verdict, probes)
+            return self._enter(verdict)
 
         if books.under_way:
             raise MotionUnknown(f"the arm answers, but does not say whether it took {names}")
 
         return []
 
-    def _enter(self, verdict: Verdict, probes: Sequence[Entry]) -> list[Entry]:
-        """Tells who put them which commands the arm took, and that probes take room; returns the others."""
-        for probe in probes:
-            self._accepted(probe, verdict.last)
+    def _enter(self, verdict: Verdict) -> list[Entry]:
+        """Tells who put them which commands the arm took; returns the others, for which there may have been no room."""
+        if verdict.lost:
+            self.room = 0
 
         for entry, index in verdict.taken:
             self._accepted(entry, index)
@@ -522,6 +551,7 @@ class MagicianExecutor:
         return await self._ask(c.GET_DEVICE_TIME) / 1000
 
     def _restarted(self) -> MotionUnknown:
+        self.room = 0
         self._completed = self._heard = self._cleared = -1
         self._summed_from = 0
         self._stood = None
@@ -531,7 +561,7 @@ class MagicianExecutor:
     async def _read_left(self) -> int:
         """Reads the left space; that of an empty queue is its capacity."""
         empty = self._empty
-        self._left = await self._ask(c.GET_QUEUED_CMD_LEFT_SPACE)
+        self._left = await self._ask(LEFT_SPACE)
         if empty and self._empty:
             self._capacity = self._left
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -19,6 +20,11 @@ class Destination(NamedTuple):
 
     numbers: tuple[float, float, float, float]
     joints: bool = False
+
+    def distance(self, pose: c.Pose) -> float:
+        """How far a pose is from it: mm and degrees."""
+        here = (pose.j1, pose.j2, pose.j3, pose.j4) if self.joints else (pose.x, pose.y, pose.z, pose.r)
+        return math.dist(here, self.numbers)
 
 
 def destination(value: Any) -> Destination | None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol, runtime_checkable
 from urllib.parse import SplitResult, parse_qsl
 
-__all__ = ["MANY", "Transport", "Wrapped", "options"]
+__all__ = ["MANY", "Transport", "Wrapped", "options", "pump"]
 
 MANY = 8
 """Unanswered requests that a byte stream carries at a time: a handful fits the arm's own input buffer."""
@@ -47,6 +47,14 @@ class Transport(Protocol):
 
     async def aclose(self) -> None:
         """Closes it; may be called again."""
+
+
+@runtime_checkable
+class Delivering(Protocol):
+    """A transport that hands over bytes as they arrive: it takes a turn of the event loop less than `receive`."""
+
+    async def deliver(self, take: Callable[[bytes], None]) -> None:
+        """Calls `take` with what arrives, until the transport ends; then raises as `receive`."""
 
 
 class Stream(Protocol):
@@ -90,3 +98,12 @@ def options(url: SplitResult, known: Mapping[str, Callable[[str], Any]]) -> dict
             raise ValueError(f"{name}={text!r} is no {known[name].__name__}") from None
 
     return found
+
+
+async def pump(transport: Transport, take: Callable[[bytes], None]) -> NoReturn:
+    """Hands over what arrives, until the transport ends; then raises as its `receive`."""
+    if isinstance(transport, Delivering):
+        await transport.deliver(take)
+
+    while True:
+        take(await transport.receive())

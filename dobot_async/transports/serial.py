@@ -29,6 +29,7 @@ WINDOW = 16
 DRAIN = 0.5
 POLL = 0.005
 BUFFER = 1 << 16
+POSIX = os.name == "posix"
 
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
@@ -38,7 +39,8 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 
     if not path or baud <= 0:
         raise ValueError("expected serial:///dev/ttyUSB0 or serial://COM3, and a baud rate above 0")
 
-    port = serial.serial_for_url(path, baudrate=baud, do_not_open=True, exclusive=True if os.name == "posix" else None)
+    port = (Port if POSIX else serial.Serial)(None, baudrate=baud, exclusive=True if POSIX else None)
+    port.port = path
     port.dtr = port.rts = False
     try:
         await in_thread(port.open, port.close)
@@ -53,6 +55,24 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 
     # Said here already, for waiting until it is said could be cancelled, and would leave an open port to nobody.
     transport.connection_made(output)
     return transport  # type: ignore[no-any-return]
+
+
+class Port(serial.Serial):
+    """A port that is read when there is something to read: pyserial would ask the system for that once more."""
+
+    def read(self, size: int | None = 1) -> bytes:
+        """Returns what is there; raises SerialException if that is nothing, for then the port is gone."""
+        try:
+            data = os.read(self.fileno(), size or 1)
+        except (BlockingIOError, InterruptedError):
+            return b""
+        except OSError as error:
+            raise serial.SerialException(f"read failed: {error}") from error
+
+        if not data:
+            raise serial.SerialException("the port is ready to be read, and has nothing: the device is gone")
+
+        return data
 
 
 class SerialTransport(asyncio.Protocol):
@@ -71,6 +91,7 @@ class SerialTransport(asyncio.Protocol):
         self._transport: Any = None
         self._buffer = bytearray()
         self._arrived: asyncio.Future[None] | None = None
+        self._take: Callable[[bytes], None] | None = None
         self._writable = asyncio.Event()
         self._writable.set()
 
@@ -99,6 +120,20 @@ class SerialTransport(asyncio.Protocol):
 
         return data
 
+    async def deliver(self, take: Callable[[bytes], None]) -> None:
+        """Hands over what arrives as soon as it does; raises as `receive` when nothing more does."""
+        if self._buffer:
+            take(await self.receive())
+
+        self._take = take
+        try:
+            while True:
+                self._check()
+                self._arrived = self._loop.create_future()
+                await self._arrived
+        finally:
+            self._take = None
+
     async def aclose(self) -> None:
         """Closes the port; what cannot be written within half a second is thrown away."""
         if not self._closing:
@@ -115,7 +150,17 @@ class SerialTransport(asyncio.Protocol):
         self._transport = transport
 
     def data_received(self, data: bytes) -> None:
-        """Keeps what arrives; stops reading while nobody takes it."""
+        """Hands over what arrives, or keeps it; stops reading while nobody takes it."""
+        if self._take:
+            try:
+                self._take(data)
+            except Exception as error:  # noqa: BLE001 - it is raised where `deliver` is awaited
+                self._take = None
+                if self._arrived and not self._arrived.done():
+                    self._arrived.set_exception(error)
+
+            return
+
         self._buffer += data
         if len(self._buffer) > BUFFER:
             self._transport.pause_reading()
@@ -143,7 +188,7 @@ class SerialTransport(asyncio.Protocol):
         pyserial-asyncio would have the loop ask the system first whether the port takes it: that costs more than the
         rest of a request together.
         """
-        if os.name != "posix" or self._transport.get_write_buffer_size():
+        if not POSIX or self._transport.get_write_buffer_size():
             return data
 
         try:

@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import islice
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar, cast
 
@@ -25,7 +26,7 @@ from dobot_async.link import Link
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.books import MODES, Books, Target, target_of
 from dobot_async.ultraarm.frame import Frame, errors
-from dobot_async.ultraarm.layouts import Answer, Receipt, Refusal, Status
+from dobot_async.ultraarm.layouts import AND_ANGLES, Answer, Receipt, Refusal, Status
 from dobot_async.wire import Command
 
 __all__ = ["Missed", "UltraArmExecutor"]
@@ -34,8 +35,9 @@ Q = TypeVar("Q")
 R = TypeVar("R")
 SILENCE = 5.0  # seconds without an answer after which the arm counts as lost, and what is under way as unknown
 PACE = 0.02  # seconds between two looks at an arm that moves
-RESTS = 2  # looks in a row at which it rests: between two motions it may look so once
-MISSES = 5  # looks at an arm that rests elsewhere than it was told to
+RESTS = 2  # looks in a row at which it rests: between two motions it may look so once; not behind the only one
+SOON = 0.15  # seconds before the end of a motion from when on it is looked at without a pause
+SETTLED = 0.2  # seconds of rest elsewhere than it was told to, after which an arm has missed its target
 GRAIN = 0.02  # mm and degrees; the arm tells hundredths
 BRAKING = 5  # looks at an arm that was told to stop
 GIVING_UP = 50  # looks at an arm without power, after which it counts as one that cannot be stopped
@@ -57,6 +59,7 @@ class UltraArmExecutor:
 
     Attributes:
         released: Whether the motors have no power, as far as this program knows.
+        room: How many more commands may be given, as far as was counted down.
     """
 
     def __init__(
@@ -70,6 +73,7 @@ class UltraArmExecutor:
     ) -> None:
         self.distress: Callable[[MotionUnknown], None] = lambda _: None
         self.released = False
+        self.room = 0
         self._link = link
         self._check = check
         self._depth = depth
@@ -88,7 +92,10 @@ class UltraArmExecutor:
         self._slipped = False
         self._halts = 0
         self._fault: Missed | None = None
-        self._rests = self._misses = 0
+        self._rests = 0
+        self._seen = False
+        self._distance: tuple[float, float] | None = None
+        self._ends_at = math.inf
         self._rest_since = self._looked_at = self._rested_at = self._taken_at = -math.inf
         self._outages = 0
 
@@ -142,9 +149,10 @@ class UltraArmExecutor:
             return 0
 
         self._draining = False
-        return max(0, self._depth - status.queue_size)
+        self.room = max(0, self._depth - status.queue_size)
+        return self.room
 
-    async def push(self, entries: Sequence[Entry], accepted: Accepted) -> None:
+    async def push(self, entries: Iterator[Entry], accepted: Accepted) -> None:
         """Gives commands to the arm one by one; returns early if it did not take one."""
         self._accepted = accepted
         halts = self._halts
@@ -152,8 +160,13 @@ class UltraArmExecutor:
         if not self._mode_known:
             await self.ask(c.RELATIVE if self._books.relative else c.ABSOLUTE, None)
 
-        for entry in entries:
-            if self._halts != halts or not await self._give(entry):
+        for entry in islice(entries, self.room):
+            if self._halts != halts:
+                return
+
+            self.room -= 1
+            if not await self._give(entry):
+                self.room = 0
                 return
 
     async def settle(self) -> None:
@@ -165,21 +178,20 @@ class UltraArmExecutor:
 
     async def completed(self) -> int | None:
         """Returns the ticket of the last command that is done."""
-        await self._sleep_until(self._looked_at + PACE)
+        soon = self._rests or self._now() > self._ends_at - SOON
+        await self._sleep_until(self._looked_at + (0.0 if soon else PACE))
         status = await self._look()
         if status.text and errors(status.text.encode()) and self._books.open:
             self._fault = Missed(status.text)
 
         dwell = 0.0 if self._tells_dwell else self._books.dwell
-        if self._rests < RESTS or self._now() < self._rest_since + dwell:
+        if self._rests < (1 if self._seen and self._books.alone else RESTS) or self._now() < self._rest_since + dwell:
             return self._books.waiting(status.queue_size)
 
-        taken = self._books.taken
-        misses = await self._misses_target()
-        if self._books.taken != taken:
-            return self._books.completed  # the arm has something new to do since it was seen to rest
+        return self._books.waiting(0) if self._misses_target(status) else self._books.all_done()
 
-        return self._books.waiting(0) if misses else self._books.all_done()
+    async def remaining(self, entry: Entry) -> None:
+        """Returns None: it looks at its own pace."""
 
     async def faults(self) -> Sequence[Missed]:
         """Returns what went wrong without an answer to tell of it."""
@@ -228,6 +240,7 @@ class UltraArmExecutor:
         while self._on_stop == "finish" and not await self._comes_to_rest(GIVING_UP):
             pass
 
+        self.room = 0
         self._draining = True
         if self._books.unfinished_mode or any(entry.command is c.MOVE_BY for entry in self._under_way):
             self._mode_known = self._books.relative = False
@@ -235,7 +248,6 @@ class UltraArmExecutor:
         self._under_way = []
         self._books.forget()
         self._fault = None
-        self._misses = 0
 
     async def pause(self) -> None:
         """Raises CommandRejected: the protocol has no pause."""
@@ -341,6 +353,7 @@ class UltraArmExecutor:
         self._under_way = []
         self._size = size
         self._busy()
+        self._seen = False
         self._taken_at = self._now()
         self._note(entry.command)
         self._accepted(entry, self._books.take(entry))
@@ -354,19 +367,23 @@ class UltraArmExecutor:
 
     def _busy(self) -> None:
         """The arm has something to do."""
-        self._rests = self._misses = 0
+        self._rests = 0
 
     async def _look(self, *, urgent: bool = False) -> Status:
         """Asks how far the arm is."""
+        target = self._books.target
+        row = STATUS_AND_ANGLES if target and target.joints else c.GET_STATUS
         try:
-            status = await self.ask(c.GET_STATUS, None, timeout=SILENCE, urgent=urgent)
+            status = await self.ask(row, None, timeout=SILENCE, urgent=urgent)
         except ProtocolError as error:
             raise ReplyTimeout(f"the arm does not say how far it is: {error}") from error
 
         self._looked_at = self._now()
         self._size = status.queue_size
+        self._expect(status)
         if not status.at_rest or status.queue_size:
             self._busy()
+            self._seen = not status.at_rest and self._books.alone
             alone = len(self._books.open) == 1 and self._books.open[0].entry.command is c.WAIT
             self._tells_dwell = self._tells_dwell or (alone and self._now() > self._taken_at + TELLING)
         elif self._now() >= self._rested_at + PACE / 2:
@@ -376,18 +393,32 @@ class UltraArmExecutor:
 
         return status
 
-    async def _misses_target(self) -> bool:
-        """Whether an arm at rest is not where the last motion leads; a fault if that stays so."""
+    def _expect(self, status: Status) -> None:
+        """Notes when the arm will be where it is to go, if it goes on as it does."""
         target = self._books.target
-        if target is None or self._tolerance is None or self._fault or self._books.verified:
+        here = target.told(status) if target else None
+        if target is None or here is None:
+            self._distance, self._ends_at = None, math.inf
+            return
+
+        now, distance = self._now(), target.miss(here)
+        if self._distance and now > self._distance[0]:
+            speed = (self._distance[1] - distance) / (now - self._distance[0])
+            self._ends_at = now + distance / speed if speed > 0 else math.inf
+
+        self._distance = now, distance
+
+    def _misses_target(self, status: Status) -> bool:
+        """Whether an arm at rest is not where the last motion leads, and may yet settle; a fault if that stays so."""
+        target = self._books.target
+        here = target.told(status) if target else None
+        if target is None or here is None or self._tolerance is None or self._fault or self._books.verified:
             return False
 
-        here = await self.place(joints=target.joints)
-        if target.miss(here) <= self._tolerance or self._books.target is not target:
+        if target.miss(here) <= self._tolerance:
             return False
 
-        self._misses += 1
-        if self._misses < MISSES:
+        if self._now() < self._rest_since + SETTLED:
             return True
 
         self._fault = Missed(f"it came to rest at {here} instead of {target}: out of reach, not homed, or obstructed")
@@ -413,6 +444,8 @@ class UltraArmExecutor:
     def _now(self) -> float:
         return asyncio.get_running_loop().time()
 
+
+STATUS_AND_ANGLES = replace(c.GET_STATUS, request=AND_ANGLES)
 
 POWERING: Mapping[Command[Any, Any], bool] = MappingProxyType({c.RELEASE: True, c.POWER_ON: False})
 """Whether the motors have no power after a command."""

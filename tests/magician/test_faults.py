@@ -5,14 +5,15 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
+from itertools import count
 
 import pytest
 from virtual import virtual
 
-from dobot_async import ConnectFailed, Magician, MotionUnknown, PTPMode, ReplyTimeout
+from dobot_async import ConnectFailed, Magician, MotionStopped, MotionUnknown, PTPMode, ReplyTimeout
 from dobot_async.magician import commands as c
 from dobot_async.magician.executor import Surplus
-from dobot_async.magician.frame import Parser
+from dobot_async.magician.frame import Frame, Parser
 from dobot_async.simulator import DeviceOptions, Faults, Simulation, simulate
 from dobot_async.transports import Transport
 
@@ -84,6 +85,17 @@ def spoil_once(number: int, into: list[tuple[float, bytes]]) -> Spoil:
     def spoil(data: bytes) -> list[tuple[float, bytes]]:
         frames = Parser().feed(data)
         return left.pop() if left and any(frame.id == number for frame in frames) else [(0, data)]
+
+    return spoil
+
+
+def spoil_nth(number: int, place: int) -> Spoil:
+    """Loses one message of a command, and none of the others."""
+    places = count()
+
+    def spoil(data: bytes) -> list[tuple[float, bytes]]:
+        hit = any(frame.id == number for frame in Parser().feed(data))
+        return [] if hit and next(places) == place else [(0, data)]
 
     return spoil
 
@@ -239,24 +251,93 @@ async def test_a_vanished_arm_ends_everything_in_time(lines: list[BadLine]) -> N
         assert loop.time() - before < 30
 
 
+@pytest.fixture
+def wide_lines(lines: list[BadLine], monkeypatch: pytest.MonkeyPatch) -> list[BadLine]:
+    """Bad lines that carry several requests at a time."""
+    monkeypatch.setattr(BadLine, "in_flight", 8)
+    monkeypatch.setattr(BadLine, "window", 16)
+    return lines
+
+
+@pytest.mark.parametrize("window", [2, 4, 16])
+@pytest.mark.parametrize("lost", [0, 1, 2, 15, 16, 17, 39])
 @pytest.mark.parametrize("spoilt", ["request", "reply"])
 @virtual
-async def test_a_burst_that_is_not_acknowledged_whole_is_settled_or_unknown(lines: list[BadLine], spoilt: str) -> None:
-    """With its first command lost, the acknowledgements of the others would pass for those before them."""
-    async with simulate(speed=20) as sim, Magician.connect(sim.url, window=4) as arm:
-        lines[0].window = 4
-        setattr(lines[0], spoilt, spoil_once(c.SET_PTP_CMD.id, []))
+async def test_one_message_lost_in_a_window_hides_nothing(
+    wide_lines: list[BadLine], window: int, lost: int, spoilt: str
+) -> None:
+    """Behind a lost command, the acknowledgements of the others would pass for those before them."""
+    expected = [200 + step for step in range(40)]
+    async with simulate(speed=20) as sim, Magician.connect(sim.url, window=window) as arm:
+        setattr(wide_lines[0], spoilt, spoil_nth(c.SET_PTP_CMD.id, lost))
+        motions = []
         try:
             async with arm.queue.batch() as batch:
-                motions = [batch.move_to(200 + step, 0, 40) for step in range(4)]
+                motions = [batch.move_to(x, 0, 40) for x in expected]
 
             await arm.queue.join()
         except MotionUnknown:
-            for motion in motions:
-                with pytest.raises(MotionUnknown):
+            done = targets(sim)
+            for x, motion in zip(expected, motions, strict=True):
+                try:
                     await motion
+                except (MotionUnknown, MotionStopped):
+                    continue
+
+                assert x in done  # a motion that is said to be done was done
         else:
-            assert targets(sim) == [200, 201, 202, 203]
+            assert targets(sim) == expected
+
+        await arm.move_to(300, 0, 40)
+        assert targets(sim)[-1] == 300
+        assert len(targets(sim)) == len(set(targets(sim)))
+
+
+@virtual
+async def test_a_window_learns_by_the_way_how_much_room_there_is(wide_lines: list[BadLine]) -> None:
+    asked = 0
+
+    def note(outgoing: bool, frame: Frame) -> None:
+        nonlocal asked
+        asked += outgoing and frame.id == c.GET_QUEUED_CMD_LEFT_SPACE.id
+
+    options = DeviceOptions(capacity=40)
+    faults = Faults(latency=0.001)
+    async with (
+        simulate(speed=1e6, options=options, faults=faults) as sim,
+        Magician.connect(sim.url, window=16) as arm,
+    ):
+        arm.link.trace = note
+        async with arm.queue.batch() as batch:
+            for step in range(320):
+                batch.move_to(200 + step / 8, 0, 40)
+
+        assert asked <= 320 / 16 + 1
+        await arm.queue.join()
+        assert targets(sim) == [200 + step / 8 for step in range(320)]
+        assert sim.arm.counters.overflowed == 0
+
+
+@pytest.mark.parametrize("window", [1, 16])
+@virtual
+async def test_a_stop_ends_a_long_batch_at_once(wide_lines: list[BadLine], window: int) -> None:
+    async with simulate(options=DeviceOptions(capacity=4)) as sim, Magician.connect(sim.url, window=window) as arm:
+
+        async def put() -> None:
+            async with arm.queue.batch() as batch:
+                for step in range(500):
+                    batch.move_to(200 + step / 8, 40 * (-1) ** step, 40)
+
+        putting = asyncio.create_task(put())
+        await asyncio.sleep(1)
+        await arm.stop()
+        requests = sim.arm.counters.requests
+        with pytest.raises(MotionStopped):
+            await putting
+
+        await asyncio.sleep(1)
+        assert sim.arm.counters.requests == requests
+        assert sim.arm.executed[-1].outcome == "aborted"
 
 
 @virtual

@@ -428,7 +428,7 @@ async def test_closing_a_broken_port_with_unsent_data_does_not_hang(
     monkeypatch.setattr(serial_transport, "DRAIN", 0.02)
     async with opened(terminal) as transport:
         await transport.send(bytes(BUFFER // 2))
-        monkeypatch.setattr(serial.Serial, "read", fail)
+        monkeypatch.setattr(serial_transport.Port, "read", fail)
         await terminal.write(b"x")
         while not transport._transport.is_closing():
             await step(1)

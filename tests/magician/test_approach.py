@@ -1,0 +1,132 @@
+"""When a motion cannot end yet: never later than it does, and with few questions."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+from itertools import count
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from virtual import virtual
+
+from dobot_async import Magician, PTPMode
+from dobot_async.executor import Entry
+from dobot_async.magician import commands as c
+from dobot_async.magician.approach import Approach
+from dobot_async.motion import DENSE, POLL, SELDOM
+from dobot_async.simulator import simulate
+
+ARITHMETIC = 1e-6
+
+
+def motion(mode: PTPMode = PTPMode.MOVL_XYZ, x: float = 100.0) -> Entry:
+    return Entry(c.SET_PTP_CMD, c.PTPCmd(mode, x, 0.0, 0.0, 0.0), None)
+
+
+def told(approach: Approach, entry: Entry) -> float | None:
+    """What it says; nothing here waits for anything."""
+    try:
+        approach.remaining(entry).send(None)
+    except StopIteration as done:
+        return done.value  # type: ignore[no-any-return]
+
+    raise AssertionError("it waits")
+
+
+@dataclass
+class Mover:
+    """Starts at 0 at second 0, goes `way` mm along x: speeds up, cruises, slows down as it has sped up."""
+
+    way: float
+    speed: float
+    ramp: float
+    now: float = 0.0
+    looks: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.ramp = min(self.ramp, self.way / self.speed)
+        self.end = self.way / self.speed + self.ramp
+
+    def gone(self) -> float:
+        now = min(max(self.now, 0.0), self.end)
+        if now < self.ramp:
+            return self.speed * now * now / self.ramp / 2
+
+        if now > self.end - self.ramp:
+            return self.way - self.speed * (self.end - now) ** 2 / self.ramp / 2
+
+        return self.speed * (now - self.ramp / 2)
+
+    async def look(self) -> c.Pose:
+        self.looks.append(self.now)
+        return c.Pose(self.gone(), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def clock(self) -> float:
+        return self.now
+
+
+@given(
+    way=st.floats(5.0, 300.0),
+    speed=st.floats(10.0, 500.0),
+    ramp=st.floats(0.02, 0.5),
+    before=st.floats(0.0, 0.5),
+    gaps=st.lists(st.floats(0.002, 0.01), min_size=1),
+)
+def test_no_motion_ends_while_the_arm_is_left_alone(
+    way: float, speed: float, ramp: float, before: float, gaps: list[float]
+) -> None:
+    """Half of what is said to remain is slept; also if it was asked before the arm set off, as behind a pause."""
+    arm = Mover(way, speed, ramp, now=-before)
+    approach = Approach(arm.look, arm.clock)
+    entry = motion(x=way)
+    for number in count():
+        least = told(approach, entry) or 0.0
+        assert arm.now + least / 2 <= arm.end + ARITHMETIC
+        arm.now += max(least / 2, gaps[number % len(gaps)])
+        if arm.now >= arm.end:
+            return
+
+
+def test_a_long_motion_takes_few_looks() -> None:
+    arm = Mover(way=1000.0, speed=100.0, ramp=0.5)
+    approach = Approach(arm.look, arm.clock)
+    entry = motion(x=1000.0)
+    while arm.now < arm.end:
+        least = told(approach, entry)
+        arm.now += POLL if least is None else max(DENSE, min(least / 2, SELDOM))
+
+    assert len(arm.looks) < 40
+
+
+@pytest.mark.parametrize("mode", [PTPMode.JUMP_XYZ, PTPMode.MOVL_INC])
+def test_of_a_detour_or_an_increment_nothing_tells(mode: PTPMode) -> None:
+    arm = Mover(way=100.0, speed=100.0, ramp=0.1)
+    assert told(Approach(arm.look, arm.clock), motion(mode)) is None
+    assert not arm.looks
+
+
+@virtual
+async def test_an_arm_is_asked_seldom_on_its_way_and_often_near_its_end() -> None:
+    async with simulate() as sim, Magician.connect(sim.url) as arm:
+        await arm.move_to(200, 0, 40)
+        before = arm.link.stats.sent
+        await arm.move_to(260, 100, 40, mode=PTPMode.MOVL_XYZ)
+        loop = asyncio.get_running_loop()
+        move = sim.arm.executed[-1]
+        assert move.finished <= loop.time() <= move.finished + 2 * DENSE
+        assert arm.link.stats.sent - before < (move.finished - move.started) / POLL / 5
+
+
+@virtual
+async def test_an_arm_that_was_paused_is_waited_for() -> None:
+    async with simulate() as sim, Magician.connect(sim.url) as arm:
+        await arm.move_to(200, 0, 40)
+        await arm.queue.pause()
+        move = await arm.queue.move_to(260, 100, 40)
+        waiting = asyncio.create_task(move.wait())
+        await asyncio.sleep(60)
+        await arm.queue.resume()
+        await waiting
+        assert asyncio.get_running_loop().time() <= sim.arm.executed[-1].finished + 2 * DENSE
