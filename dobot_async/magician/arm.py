@@ -234,7 +234,7 @@ class Magician(Verbs[Awaitable[None]]):
         """Clears the alarms; what the arm was doing when they came up does not go on. Manual 2.5.2."""
         await self.queue.update()  # without its alarm a motion that failed looks like one that is done
         await self.link.request(c.CLEAR_ALL_ALARMS_STATE, None, timeout=timeout)
-        self._executor.alarms_cleared()
+        self._executor.readings.alarms_cleared()
 
     async def recover(self) -> None:
         """Clears the alarms, empties the queue and starts it: the arm is ready for new commands."""
@@ -350,7 +350,7 @@ class Magician(Verbs[Awaitable[None]]):
                 bias = await self.link.request(c.GET_END_EFFECTOR_PARAMS, None, timeout=timeout)
                 self.kinematics = Kinematics(bias.x_bias, bias.y_bias, bias.z_bias)
                 if remember:
-                    await self._executor.remember()
+                    await self._executor.readings.remember()
 
                 if fresh:
                     await self._executor.reset()

@@ -15,17 +15,18 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from dobot_async.errors import MotionUnknown, ProtocolError, ReplyTimeout
 from dobot_async.executor import Accepted, Entry
 from dobot_async.link import Link
 from dobot_async.magician import commands as c
-from dobot_async.magician.alarms import Alarm, decode, faults
+from dobot_async.magician.alarms import Alarm, faults
 from dobot_async.magician.approach import Approach
 from dobot_async.magician.books import Attempt, Books, Verdict
 from dobot_async.magician.frame import Frame
 from dobot_async.magician.reach import destination, is_relative
+from dobot_async.magician.readings import GARBAGE, SILENCE, Readings
 from dobot_async.posted import Posted
 from dobot_async.wire import Command, Number, u64
 
@@ -35,11 +36,6 @@ Q = TypeVar("Q")
 R = TypeVar("R")
 INDEX: Number[int] = Number(u64)
 LEFT_SPACE = c.GET_QUEUED_CMD_LEFT_SPACE
-SILENCE = 5.0  # seconds without an answer after which the arm counts as lost, and what is under way as unknown
-GARBAGE = 1 << 32  # an index so far beyond the last one is what some firmware shows while it moves
-SAME_RUN = 0.95  # of the seconds that have passed, the arm's own clock has counted at least so many
-STANDSTILL = 1.0  # seconds between two poses of an arm that shows nonsense for an index
-RESTARTED = 0x00  # the alarm that an arm shows from power-up until it is cleared
 PROBES = 60  # in a row, none acknowledged although the arm answers what it is asked
 ARRIVED = 0.5  # mm and degrees
 WARY = 64  # commands that are sent one at a time after one was not acknowledged
@@ -85,25 +81,22 @@ class MagicianExecutor:
 
     Attributes:
         room: How many commands it can take for certain, as far as was counted down.
+        readings: What the arm says of itself.
     """
 
     def __init__(self, link: Link[Frame], window: int, check: Callable[[Any], None]) -> None:
         self.room = 0
         self.distress: Callable[[MotionUnknown], None] = lambda _: None
+        self.readings = Readings(link, self._restarted)
         self._link = link
         self._window = window
         self._check = check
         self._books = Books()
-        self._approach = Approach(partial(self._ask, c.GET_POSE), self._now)
+        self._approach = Approach(partial(self.readings.ask, c.GET_POSE), self._now)
         self._heard = -1
-        self._completed = -1
         self._cleared = -1
         self._summed_from = 0
         self._outages = 0
-        self._stood: c.Pose | None = None
-        self._questioned_at = -math.inf
-        self._restart_known = True
-        self._uptime: tuple[float, float] | None = None
         self._capacity: int | None = None
         self._empty = False
         self._verified = False
@@ -123,12 +116,8 @@ class MagicianExecutor:
         """Returns when the link is open, and after an outage when the arm is known to be in the same run as before."""
         await self._link.opened()
         if self._outages != self._link.outages:
-            await self._recognise()
+            await self.readings.recognise(self._books.last)
             self._outages = self._link.outages
-
-    async def remember(self) -> None:
-        """Notes the arm's clock, so that it can be told after an outage whether it was switched off. V1.1."""
-        self._uptime = await self._read_uptime(), self._now()
 
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
         """Returns a checked and encoded command."""
@@ -165,11 +154,11 @@ class MagicianExecutor:
 
     async def completed(self) -> int | None:
         """Returns the index of the last finished command, None if the arm does not say. Manual 2.19.7."""
-        index = await self._index()
+        index = await self.readings.index(self._books.last)
         if index is None or self._books.last is None:
             return None
 
-        if self._link.disorder and index > self._completed:
+        if self._link.disorder and index > self.readings.completed:
             # A doubled command shifts the indices of those behind it, so an index counts only if the sum is right.
             began = self._now()
             surplus = await self._count()
@@ -178,7 +167,7 @@ class MagicianExecutor:
 
             self._recount(surplus, began)
 
-        self._completed = max(self._completed, index)
+        self.readings.completed = max(self.readings.completed, index)
         if index == self._books.last and not self._books.under_way:
             self._relative, self._empty = None, True
 
@@ -190,22 +179,18 @@ class MagicianExecutor:
 
     async def faults(self) -> Sequence[Alarm]:
         """Returns the alarms that keep the arm from moving. Manual 2.5.1."""
-        return faults(await self._alarms())
-
-    def alarms_cleared(self) -> None:
-        """Takes note that the alarms were cleared: that of a restart can only come from a new one."""
-        self._restart_known = False
+        return faults(await self.readings.alarms())
 
     async def stands_at(self, entry: Entry) -> bool:
         """Returns whether the arm stands where an absolute motion leads."""
         target = destination(entry.value)
-        return target is not None and target.distance(await self._ask(c.GET_POSE)) < ARRIVED
+        return target is not None and target.distance(await self.readings.ask(c.GET_POSE)) < ARRIVED
 
     async def halt(self) -> None:
         """Stops the arm where it is, jogs included, ahead of everything else. Manual 2.19.3 and 2.10.4."""
         await asyncio.gather(
-            self._ask(c.SET_QUEUED_CMD_FORCE_STOP_EXEC, urgent=True),
-            self._ask(c.SET_JOG_CMD, c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE), urgent=True),
+            self.readings.ask(c.SET_QUEUED_CMD_FORCE_STOP_EXEC, urgent=True),
+            self.readings.ask(c.SET_JOG_CMD, c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE), urgent=True),
         )
         self._controlled_at = self._now()
 
@@ -244,7 +229,7 @@ class MagicianExecutor:
     async def _control(self, command: Command[None, None]) -> None:
         """Sends a command that steers the queue, so late that nothing that was sent before arrives behind it."""
         await self._sleep_until(max(self._controlled_at, self._posted_at) + self._link.disorder)
-        await self._ask(command, urgent=True)
+        await self.readings.ask(command, urgent=True)
         self._controlled_at = self._now()
 
     async def _stream(self, entries: Iterator[Entry]) -> None:
@@ -439,7 +424,7 @@ class MagicianExecutor:
             try:
                 await self._link.opened()
                 if not attempt:
-                    await self._alarms()
+                    await self.readings.alarms()
 
                 counted = await self._count()
             except ReplyTimeout:
@@ -503,7 +488,7 @@ class MagicianExecutor:
             return None
 
         state, left = self._state(), await self._read_left()
-        while (finished := await self._index()) is not None:
+        while (finished := await self.readings.index(self._books.last)) is not None:
             last, _, cleared = state
             if last is None:
                 return None
@@ -526,84 +511,21 @@ class MagicianExecutor:
         """What a count is made against."""
         return self._books.last, len(self._books.under_way), self._cleared
 
-    async def _alarms(self) -> tuple[Alarm, ...]:
-        """Reads the alarms; raises MotionUnknown if that of a restart has come up. Manual 2.5.1."""
-        known, alarms = self._restart_known, decode(await self._ask(c.GET_ALARMS_STATE))
-        self._restart_known = any(alarm.code == RESTARTED for alarm in alarms)
-        if self._restart_known and not known:
-            raise self._restarted()
-
-        return alarms
-
-    async def _recognise(self) -> None:
-        """Raises MotionUnknown if the arm was switched off and on: its clock and its indices begin anew."""
-        await self._index()
-        if self._uptime is None:
-            return
-
-        uptime, read_at = self._uptime
-        await self.remember()
-        if self._uptime[0] < uptime + SAME_RUN * (self._uptime[1] - read_at):
-            raise self._restarted()
-
-    async def _read_uptime(self) -> float:
-        """Reads the seconds since power-up."""
-        return await self._ask(c.GET_DEVICE_TIME) / 1000
-
-    def _restarted(self) -> MotionUnknown:
+    def _restarted(self) -> None:
+        """The arm was switched off and on: it counts its commands anew, and its queue is empty."""
         self.room = 0
-        self._completed = self._heard = self._cleared = -1
+        self._heard = self._cleared = -1
         self._summed_from = 0
-        self._stood = None
         self._books = Books(under_way=self._books.under_way)  # until `reset`: their Motions are still to be ended
-        return MotionUnknown("the arm was switched off and on: it counts its commands anew, and its queue is empty")
 
     async def _read_left(self) -> int:
         """Reads the left space; that of an empty queue is its capacity."""
         empty = self._empty
-        self._left = await self._ask(LEFT_SPACE)
+        self._left = await self.readings.ask(LEFT_SPACE)
         if empty and self._empty:
             self._capacity = self._left
 
         return self._left
-
-    async def _index(self) -> int | None:
-        """Reads the index of the last finished command; None where firmware shows nonsense instead."""
-        index = await self._ask(c.GET_QUEUED_CMD_CURRENT_INDEX)
-        last = self._books.last
-        if last is not None and index > last + GARBAGE:
-            await self._question()
-            return None
-
-        self._stood = None
-        if index < self._completed:
-            raise self._restarted()
-
-        return index
-
-    async def _question(self) -> None:
-        """Raises MotionUnknown if an arm that shows nonsense for an index stands still.
-
-        What some firmware shows while it moves, all firmware shows from power-up until a command is finished.
-        """
-        if self._now() < self._questioned_at + STANDSTILL:
-            return
-
-        self._questioned_at = self._now()
-        before, self._stood = self._stood, await self._ask(c.GET_POSE)
-        if self._stood == before:
-            raise self._restarted()
-
-    async def _ask(self, command: Command[Q, R], value: Q | None = None, *, urgent: bool = False) -> R:
-        """Sends what may be repeated, however bad the line is; raises ReplyTimeout if the arm is silent to it."""
-        for last in (False, False, True):
-            try:
-                return await self._link.request(command, cast(Q, value), timeout=SILENCE, urgent=urgent, lenient=True)
-            except ReplyTimeout:
-                if last or self._link.heard_at < self._now() - SILENCE:
-                    raise
-
-        raise AssertionError
 
     async def _sleep_until(self, when: float) -> None:
         seconds = when - self._now()
