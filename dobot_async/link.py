@@ -16,20 +16,20 @@ import asyncio
 import math
 import random
 from collections.abc import Awaitable, Callable, Hashable, Sequence
-from contextlib import suppress
 from functools import partial
 from typing import Any, Generic, TypeVar
 
 import anyio
 
+from dobot_async.asking import Asking
 from dobot_async.contract import Encoder, Frame, LinkState, LinkStats, Parser, Unexpected
 from dobot_async.errors import ConnectFailed, ConnectionLost, ProtocolError, ReplyTimeout
 from dobot_async.events import Events, Watched
-from dobot_async.pending import SWALLOWED, Pending, Waiter
-from dobot_async.posted import Posted, deliver
+from dobot_async.pending import LINGER, Pending
+from dobot_async.posted import Posted
 from dobot_async.roundtrip import RoundTrip
 from dobot_async.transports import Transport, hidden
-from dobot_async.transports.base import pump
+from dobot_async.transports.base import prompt, pump
 from dobot_async.turns import Turns
 from dobot_async.wire import Command
 
@@ -40,7 +40,6 @@ R = TypeVar("R")
 Q = TypeVar("Q")
 IMMEDIATE_RANK, QUEUED_RANK = 0, 1
 CLOSE_TIMEOUT = 2.0
-LEAST_PATIENCE = 0.001  # seconds; nobody answers a request for which less is left
 BREAK = 0.005  # seconds without a byte in the middle of a frame, after which the rest of it does not come
 FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0
 BROKEN = (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceError, OSError)
@@ -84,10 +83,10 @@ class Link(Generic[F]):
         self.stray: Callable[[F], None] | None = None
         self._reopen = reopen
         self._transport = transport
+        self._write = prompt(transport)
         self._parser = parser
         self._encode = encode
         self._filler = filler
-        self._fences = fences
         self._unanswered = 0
         self._arrived_at = -math.inf
         self._read_only = read_only
@@ -96,9 +95,23 @@ class Link(Generic[F]):
         self._pending: Pending[F] = Pending(self._loop.time, disorder=lambda: self.disorder)
         self._turns = Turns(transport.in_flight)
         self._round_trip = round_trip or RoundTrip()
+        self._asking: Asking[F] = Asking(
+            self,
+            self._pending,
+            self._round_trip,
+            self._stats,
+            send=self._send,
+            resync=self._resync,
+            fences=[encode(command, command.request.encode(None), queued=False) for command in fences],
+        )
         self._sending = asyncio.Lock()
         self._cause: BaseException | None = None
         self._reader = self._loop.create_task(self._read(), name=f"dobot_async reader {url}")
+
+    @property
+    def open(self) -> bool:
+        """Whether it is open just now."""
+        return self.state.value is LinkState.OPEN
 
     @property
     def disorder(self) -> float:
@@ -204,11 +217,30 @@ class Link(Generic[F]):
         lenient = lenient and self.disorder > 0
         waiter = self._pending.expect(frame.key, accept, echo=echo, repeatable=repeatable, lenient=lenient)
         try:
-            answer: R = await self._exchange(frame, waiter, name, timeout, urgent=urgent, ready=ready)
+            answer: R = await self._asking.exchange(frame, waiter, name, timeout, urgent=urgent, ready=ready)
             return answer
         finally:
             if not urgent:
                 self._turns.give(frame.key)
+
+    def shout(self, command: Command[None, Any]) -> None:
+        """Sends a command before this returns, if the transport can; nobody hears of its answer.
+
+        For a stop, which many links are to carry at once: all of them are told before any is waited for. Whether it has
+        arrived is for a `request` of the same to find out, so it must be harmless twice.
+        """
+        if self._read_only or self.disorder or not self.open:
+            return
+
+        frame = self.frame(command, None)
+        if self._write(bytes(frame)):
+            waiter = self._pending.expect(frame.key, lambda _: None)
+            waiter.listen(lambda _: None)
+            waiter.sent()
+            self._loop.call_later(LINGER, self._pending.leave, waiter)
+            self._stats.sent += 1
+            if self.trace:
+                self.trace(True, frame)
 
     async def post(
         self,
@@ -250,7 +282,7 @@ class Link(Generic[F]):
         except BaseException as error:
             posted.forget()
             if isinstance(error, TimeoutError):
-                raise self._overdue(name, timeout) from None
+                raise self.too_late(name, timeout) from None
 
             raise
 
@@ -276,6 +308,10 @@ class Link(Generic[F]):
 
         return value
 
+    def too_late(self, name: str, timeout: float) -> ReplyTimeout:
+        """What to raise if no answer has come."""
+        return ReplyTimeout(f"no answer to {name} from {self.url} within {timeout:.3g} s")
+
     async def aclose(self) -> None:
         """Closes the link; everybody who still waits gets ConnectionLost. Takes at most 2 s."""
         with anyio.CancelScope(shield=True), anyio.move_on_after(CLOSE_TIMEOUT, shield=True):
@@ -299,9 +335,6 @@ class Link(Generic[F]):
         reason = str(self._cause) or type(self._cause).__name__
         return ConnectionLost(f"the connection to {self.url} was lost: {reason}; is the arm powered and the cable in?")
 
-    def _overdue(self, name: str, timeout: float) -> ReplyTimeout:
-        return ReplyTimeout(f"no answer to {name} from {self.url} within {timeout:.3g} s")
-
     def _end(self, state: LinkState, cause: BaseException | None) -> None:
         """The one door of death; only the first cause counts."""
         if self.state.value in DEAD:
@@ -312,148 +345,6 @@ class Link(Generic[F]):
         self.state.close()
         self._pending.fail(self._lost())
         self.events.close()
-
-    async def _exchange(
-        self, frame: F, waiter: Waiter[F], name: str, timeout: float, *, urgent: bool, ready: Callable[[], None]
-    ) -> Any:
-        """Sends a frame, again and again if that is harmless, and returns what its waiter makes of the answer."""
-        deadline = self._loop.time() + timeout
-        overdue = False
-        with waiter:
-            while (left := deadline - self._loop.time()) > LEAST_PATIENCE:
-                if not await self._ready(waiter, left, urgent=urgent):
-                    break
-
-                if not waiter.sends:
-                    ready()
-
-                reply = self._listen(waiter, resync=bool(waiter.sends))
-                patience = min(left, self._round_trip.timeout) if waiter.repeatable else left
-                if not await self._ask(frame, waiter, reply, patience):
-                    overdue = True
-                elif reply.result() is not SWALLOWED:
-                    self._measure(waiter.sends, overdue=overdue)
-                    return self.answer(reply)
-
-            reply = self._listen(waiter, resync=True)
-            if reply.done() and reply.result() is not SWALLOWED:
-                return self.answer(reply)
-
-        if waiter.misfit:
-            raise ProtocolError(f"{name}: the arm's answer does not fit: {waiter.misfit}")
-
-        self._stats.timeouts += 1
-        raise self._overdue(name, timeout)
-
-    def _measure(self, sends: list[float], *, overdue: bool) -> None:
-        """Learns from a call that is answered now how long answers take."""
-        now = self._loop.time()
-        if len(sends) == 1:
-            self._round_trip.sample(now - sends[0])
-        else:
-            self._round_trip.probably(now - sends[-2] if overdue else 0.0)
-
-    async def _ready(self, waiter: Waiter[F], seconds: float, *, urgent: bool) -> bool:
-        """Returns when a request may be sent, so that its answer is known from others; False if that is too late."""
-        key, urgent = waiter.key, urgent and not waiter.sends
-        owed = None if urgent else self._pending.owed(key, but=waiter)
-        if self.state.value is LinkState.OPEN and (urgent or (owed is None and not self.disorder)):
-            return True
-
-        with suppress(TimeoutError):
-            async with asyncio.timeout(seconds):
-                await self.opened()
-                if owed is not None:
-                    waiter.fenced = await self._fence(key, owed)
-
-                if not urgent:
-                    await self._calm(key)
-
-                return True
-
-        return False
-
-    async def _fence(self, key: Hashable, owed: float) -> bool:
-        """Asks something else, if it can: what is owed and not there when that is answered was lost."""
-        frame = self._other(key)
-        if frame is None:
-            return False
-
-        await self._calm(frame.key)
-        if self.disorder:
-            await asyncio.sleep(owed + self.disorder - self._loop.time())
-
-        answered: asyncio.Future[Any] = self._loop.create_future()
-        with self._pending.expect(frame.key, lambda _: None) as waiter, suppress(TimeoutError):
-            waiter.listen(partial(deliver, answered))
-            self._stats.sent += 1
-            waiter.sent()
-            await self._send(frame)
-            if self.disorder:  # on a stream nothing overtakes it
-                async with asyncio.timeout(self._round_trip.timeout):
-                    await answered
-
-        await asyncio.sleep(self.disorder)
-        return True
-
-    async def _calm(self, key: Hashable) -> None:
-        """Returns when no second answer to a request of this key can arrive: it would pass for the next one's."""
-        if self.disorder:
-            await asyncio.sleep(self._pending.calm_at(key) - self._loop.time())
-
-    def _listen(self, waiter: Waiter[F], *, resync: bool) -> asyncio.Future[Any]:
-        """Returns where the next answer arrives; it may do so at once, out of what an incomplete frame held back."""
-        reply: asyncio.Future[Any] = self._loop.create_future()
-        waiter.listen(partial(deliver, reply))
-        if resync and self._loop.time() > self._arrived_at + BREAK:
-            self._receive(self._parser.resync())
-
-        return reply
-
-    async def _ask(self, frame: F, waiter: Waiter[F], reply: asyncio.Future[Any], patience: float) -> bool:
-        """Sends a frame, unless its answer is there already; returns whether there is one in time."""
-        with suppress(TimeoutError):
-            async with asyncio.timeout(patience):
-                if not reply.done():
-                    self._stats.sent += 1
-                    self._stats.repeated += bool(waiter.sends)
-                    waiter.sent()
-                    await self._send(frame)
-                    await self._prove(waiter, reply)
-
-                await reply
-
-        waiter.give_up()
-        if reply.done() and not reply.cancelled():
-            return True
-
-        self.overdue()
-        return False
-
-    async def _prove(self, waiter: Waiter[F], reply: asyncio.Future[Any]) -> None:
-        """Where an answer may be late alone, asks something else behind the question, and waits for both answers.
-
-        If there is one answer to the question by then, it is the right one: replies come in order.
-        """
-        if self.disorder or waiter.lenient or not self._pending.haunted(waiter):
-            return
-
-        frame = self._other(waiter.key)
-        if frame is None:
-            return
-
-        waiter.hold()
-        with self._pending.expect(frame.key, lambda _: None) as witness:
-            witness.listen(waiter.prove)
-            self._stats.sent += 1
-            witness.sent()
-            await self._send(frame)
-            await reply
-
-    def _other(self, key: Hashable) -> F | None:
-        """A question of another key to which no answer is awaited."""
-        frames = (self.frame(command, None) for command in self._fences)
-        return next((frame for frame in frames if frame.key != key and not self._pending.line(frame.key)), None)
 
     async def _turn(self, key: Hashable, rank: int, timeout: float, what: str) -> None:
         """Waits for the turn of a request, no longer than its own timeout."""
@@ -515,6 +406,7 @@ class Link(Generic[F]):
         while True:
             try:
                 self._transport = await reopen()
+                self._write = prompt(self._transport)
                 break
             except (ConnectFailed, OSError):
                 await asyncio.sleep(pause * random.uniform(0.5, 1.0))  # noqa: S311 - no secret
@@ -523,6 +415,11 @@ class Link(Generic[F]):
         self._parser.reset()
         self.outages += 1
         self.state.change(LinkState.OPEN)
+
+    def _resync(self) -> None:
+        """Gives up a frame the rest of which is overdue; what is found inside of it goes to those who wait."""
+        if self._loop.time() > self._arrived_at + BREAK:
+            self._receive(self._parser.resync())
 
     def _feed(self, data: bytes) -> None:
         """Takes the next bytes of the line."""

@@ -215,6 +215,16 @@ class MotionQueue:
         """Throws away all that is queued, the running command included; its Motions raise MotionStopped."""
         await undisturbed(self._stop(MotionStopped("the arm's queue was cleared"), halt=False))
 
+    @contextmanager
+    def stopping(self, error: DobotError) -> Iterator[None]:
+        """To be entered before the arm is told to stop: of what it ticks off meanwhile nothing counts as done."""
+        self._refuse(error)
+        self._stopping += 1
+        try:
+            yield
+        finally:
+            self._stopping -= 1
+
     def fail(self, error: DobotError) -> None:
         """Ends all Motions, and the puts that wait for room, with an error."""
         self._refuse(error)
@@ -306,22 +316,19 @@ class MotionQueue:
 
     async def _stop(self, error: DobotError, *, halt: bool = True) -> None:
         """Stops, ends all Motions, waits for the put that is under way, and empties the queue behind it."""
-        self._refuse(error)
-        self._stopping += 1
-        try:
-            if halt:
-                await self._executor.halt()
+        with self.stopping(error):
+            try:
+                if halt:
+                    await self._executor.halt()
 
-            self.fail(error)
-            async with self._order:
-                under_way = list(self._executor.under_way)
-                await self._executor.reset()
-                self._end_all(error, under_way)  # who puts from now on waits for this lock, and goes on
-        except DobotError as failure:
-            self.fail(failure)
-            raise
-        finally:
-            self._stopping -= 1
+                self.fail(error)
+                async with self._order:
+                    under_way = list(self._executor.under_way)
+                    await self._executor.reset()
+                    self._end_all(error, under_way)  # who puts from now on waits for this lock, and goes on
+            except DobotError as failure:
+                self.fail(failure)
+                raise
 
     def _distress(self, error: MotionUnknown) -> None:
         """Gives up although nobody asks just now."""
@@ -406,15 +413,11 @@ class MotionQueue:
         """
         text = "; ".join(map(str, faults))
         error = ArmAlarm(f"the arm raised alarms: {text}", faults)
-        self._refuse(error)
-        self._stopping += 1
-        try:
+        with self.stopping(error):
             await self._executor.halt()
             for motion in [motion for motion in reached if motion.moves][:-1]:
                 if await self._executor.stands_at(motion.entry):
                     motion.end()
-        finally:
-            self._stopping -= 1
 
         await self._stop(error, halt=False)
 

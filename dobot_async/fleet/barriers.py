@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 from dobot_async.errors import ReplyTimeout
-from dobot_async.fleet.errors import BarrierBroken
+from dobot_async.fleet.claims import Claims, Party, Pause
+from dobot_async.fleet.errors import BarrierBroken, ZoneDeadlock
+from dobot_async.fleet.zones import Program
 
 __all__ = ["Barriers"]
 
@@ -18,17 +21,25 @@ class Gathering:
 
     Attributes:
         parties: Who is to come.
-        waiting: One for each who has come.
+        waiting: One for each who has come, and as which program of the run, if it is of one.
         broken: Why nobody gets past any more.
     """
 
     parties: frozenset[str]
-    waiting: list[asyncio.Future[str]] = field(default_factory=list)
+    waiting: dict[asyncio.Future[str], Party | None] = field(default_factory=dict)
     broken: str = ""
+
+    def absent(self, run: Mapping[str, Party], arrived: asyncio.Future[str]) -> list[Party]:
+        """Who of a run keeps one who has come from going on."""
+        if arrived.done():
+            return []
+
+        come = set(self.waiting.values())
+        return [run[name] for name in sorted(self.parties & run.keys()) if run[name] not in come]
 
     def open(self, why_not: str = "") -> None:
         """Tells all who have come that they may go on, or why not, and is ready for the next time."""
-        waiting, self.waiting = self.waiting, []
+        waiting, self.waiting = self.waiting, {}
         for each in waiting:
             if not each.done():
                 each.set_result(why_not)
@@ -40,22 +51,38 @@ class Gathering:
 
 
 class Barriers:
-    """The barriers of a fleet, by name."""
+    """The barriers of a fleet, by name.
 
-    def __init__(self) -> None:
+    Args:
+        claims: Where it is found out who would wait for himself.
+    """
+
+    def __init__(self, claims: Claims) -> None:
+        self._claims = claims
         self._gatherings: dict[tuple[int, str], Gathering] = {}
         self._gone: dict[tuple[int, str], str] = {}
 
-    async def wait(self, name: str, parties: Collection[str], *, run: object = None, timeout: float | None) -> None:
+    async def wait(
+        self, name: str, parties: Collection[str], program: Program, arms: frozenset[Party], timeout: float | None
+    ) -> None:
         """Returns when as many have come as there are parties.
+
+        Args:
+            name: Of the barrier, in the run of the program.
+            parties: The names of those who are to come.
+            program: Who comes.
+            arms: Those that wait for its command.
+            timeout: Seconds.
 
         Raises:
             ValueError: It was reached with other parties before.
             BarrierBroken: One of them failed, ended or gave up.
+            ZoneDeadlock: One of them waits, in the end, for what this program holds.
             ReplyTimeout: They did not all come in time; for the others it is broken.
         """
-        key = (id(run), name)
-        gathering = self._gatherings.setdefault(key, Gathering(frozenset(parties)))
+        part = program.part()
+        run = part.run if part else None
+        gathering = self._gatherings.setdefault((id(run), name), Gathering(frozenset(parties)))
         if gathering.parties != frozenset(parties):
             raise ValueError(f"barrier {name!r} is for {words(gathering.parties)}, not for {words(parties)}")
 
@@ -66,16 +93,22 @@ class Barriers:
 
         check(name, gathering.broken)
         arrived: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-        gathering.waiting.append(arrived)
-        if len(gathering.waiting) == len(gathering.parties):
-            gathering.open()
-
+        gathering.waiting[arrived] = part.party if part else None
+        absent = partial(gathering.absent, run.parties if run else {}, arrived)
+        pause = Pause(f"at barrier {name!r} for", program.party, arms | {program.party}, absent)
         try:
-            async with asyncio.timeout(timeout):
-                why_not = await arrived
+            if len(gathering.waiting) == len(gathering.parties):
+                gathering.open()
+
+            with self._claims.pausing(pause):
+                async with asyncio.timeout(timeout):
+                    why_not = await arrived
+        except ZoneDeadlock:
+            del gathering.waiting[arrived]  # it may come again, with empty hands
+            raise
         except BaseException as error:
             if arrived in gathering.waiting:
-                gathering.waiting.remove(arrived)
+                del gathering.waiting[arrived]
                 gathering.end("a partner gave up waiting")
 
             if isinstance(error, TimeoutError):

@@ -35,7 +35,6 @@ from dobot_async.fleet.shapes import Box, Cylinder, Shape
 
 __all__ = ["Cell", "parse_cell", "read_cell"]
 
-KINDS = {family.name: kind for kind, family in FAMILIES.items()}
 ARM_KEYS = ("url", "family", "model", "base", "group", "guard", "clearance", "limits", "options")
 
 
@@ -86,8 +85,9 @@ def member(table: Mapping[str, Any]) -> Member[AnyArm]:
     """An arm."""
     known(table, ARM_KEYS, "an arm")
     url, family = text(table, "url"), text(table, "family", "magician")
-    if family not in KINDS:
-        raise ValueError(f"family: one of {', '.join(KINDS)}, not {family!r}")
+    kinds = {each.name: each.arm for each in FAMILIES}
+    if family not in kinds:
+        raise ValueError(f"family: one of {', '.join(kinds)}, not {family!r}")
 
     options = dict(sub(table, "options"))
     if "model" in table:
@@ -96,7 +96,7 @@ def member(table: Mapping[str, Any]) -> Member[AnyArm]:
     limits = sub(table, "limits")
     return Member(
         url,
-        cast("type[AnyArm]", KINDS[family]),
+        cast("type[AnyArm]", kinds[family]),
         options=options,
         base=at("base", frame, sub(table, "base")),
         group=text(table, "group") if "group" in table else None,

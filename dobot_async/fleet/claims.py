@@ -1,4 +1,6 @@
-"""Who holds which zones, and who waits for them. No I/O and no clock: each claim is told its answer by a call.
+"""Who holds which zones, who waits for them, and who waits for whom elsewhere.
+
+No I/O and no clock: each claim is told its answer by a call.
 
     request --> waiting --free of others, nobody before it--> granted --> release
                    |
@@ -6,19 +8,22 @@
 
 A claim is for one or several zones, all of which it gets at once. Claims on the same zone are granted in the order of
 their requests. There is one exception: a claim passes an earlier one that waits, directly or not, for the party that
-asks, for that one would otherwise wait for itself. A cycle of waits that is left is a deadlock, and its latest claim is
-told so.
+asks, for that one would otherwise wait for itself. A cycle of waits that is left is a deadlock, and who closes it is
+told so. An arm that still moves may yet leave a zone by itself; whether it does shows when it stands.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain
 
 from dobot_async.errors import DobotError
 from dobot_async.fleet.errors import ZoneDeadlock, ZoneOccupied
 
-__all__ = ["Claim", "Claims", "Party"]
+__all__ = ["Claim", "Claims", "Party", "Pause"]
 
 
 @dataclass(eq=False, slots=True)
@@ -28,10 +33,12 @@ class Party:
     Attributes:
         name: For messages.
         failure: Why it will not leave what it holds; None while all is well.
+        moving: Tells whether it may leave what it holds without being told to.
     """
 
     name: str
     failure: DobotError | None = None
+    moving: Callable[[], bool] = field(default=lambda: False)
 
 
 @dataclass(eq=False, slots=True)
@@ -45,6 +52,7 @@ class Claim:
         answer: Called once: with None when it is granted, with the error when it never will be.
         patient: False gives it an error where it would have to wait.
         stuck: The parties that release nothing as long as it waits: its own, and the arms that wait for its command.
+        asker: Who goes on when it is answered; by default `party`.
     """
 
     party: Party
@@ -53,9 +61,33 @@ class Claim:
     answer: Callable[[DobotError | None], None] = field(default=lambda _: None)
     patient: bool = True
     stuck: frozenset[Party] = frozenset()
+    asker: Party | None = None
 
     def __post_init__(self) -> None:
         self.stuck |= self.own
+        self.asker = self.asker or self.party
+
+
+@dataclass(eq=False, slots=True)
+class Pause:
+    """A program's wait for others to do something: to come to a barrier, or to let it command an arm.
+
+    Attributes:
+        what: For messages, up to the name of who is awaited.
+        asker: Who waits.
+        stuck: The parties that release nothing as long as it waits.
+        awaited: Tells who is still to do it.
+    """
+
+    what: str
+    asker: Party
+    stuck: frozenset[Party]
+    awaited: Callable[[], Collection[Party]]
+
+
+Wait = Claim | Pause
+Obstacle = tuple[Callable[[Wait], bool], str]
+"""What keeps a wait from ending: whether another wait has to end before, and the words for it."""
 
 
 class Claims:
@@ -64,6 +96,8 @@ class Claims:
     def __init__(self) -> None:
         self._held: list[Claim] = []
         self._waiting: list[Claim] = []
+        self._prepared: list[Claim] = []
+        self._pauses: list[Pause] = []
 
     @property
     def held(self) -> list[Claim]:
@@ -79,6 +113,15 @@ class Claims:
         """Returns who holds a zone."""
         return list(dict.fromkeys(claim.party for claim in self._held if zone in claim.zones))
 
+    @contextmanager
+    def preparing(self, claim: Claim) -> Iterator[None]:
+        """While this is entered, a claim is not judged yet, but ended as one that waits."""
+        self._prepared.append(claim)
+        try:
+            yield
+        finally:
+            self._prepared.remove(claim)
+
     def request(self, claim: Claim) -> None:
         """Enters a claim; it may be answered before this returns."""
         self._waiting.append(claim)
@@ -87,17 +130,37 @@ class Claims:
             self._waiting.remove(claim)
             claim.answer(ZoneOccupied(f"{claim.party.name} may not pass: {self._reason(claim)}"))
 
+    @contextmanager
+    def pausing(self, pause: Pause) -> Iterator[None]:
+        """While this is entered, a program waits for others; raises ZoneDeadlock if it would do so for ever."""
+        cycle = self._cycle(pause)
+        if cycle:
+            raise deadlock(cycle)
+
+        self._pauses.append(pause)
+        self.settle()
+        try:
+            yield
+        finally:
+            self._pauses.remove(pause)
+
     def take(self, claim: Claim) -> None:
         """Grants a claim to who is in the zones already, whoever else holds them."""
         self._held.append(claim)
         self.settle()
 
-    def release(self, claim: Claim, zones: Collection[str] | None = None) -> None:
-        """Gives back some zones, all by default; a claim that waits is withdrawn. What is not held does not matter."""
+    def release(self, claim: Claim) -> None:
+        """Gives back all zones of a claim, which is withdrawn if it waits."""
         if claim in self._waiting:
             self._waiting.remove(claim)
-        elif claim in self._held:
-            claim.zones = frozenset() if zones is None else claim.zones - frozenset(zones)
+            self.settle()
+        else:
+            self.keep([claim], frozenset())
+
+    def keep(self, claims: Collection[Claim], zones: frozenset[str]) -> None:
+        """Gives back all that several claims hold but some zones. What is not held does not matter."""
+        for claim in [claim for claim in claims if claim in self._held]:
+            claim.zones &= zones
             if not claim.zones:
                 self._held.remove(claim)
 
@@ -105,19 +168,11 @@ class Claims:
 
     def fail(self, parties: Collection[Party], error: DobotError) -> None:
         """Ends the waiting of all that act for one of these parties."""
-        for claim in [claim for claim in self._waiting if not claim.stuck.isdisjoint(parties)]:
-            self._waiting.remove(claim)
-            claim.answer(error)
-
-        self.settle()
+        self._end(lambda claim: not claim.stuck.isdisjoint(parties), error)
 
     def interrupt(self, party: Party, error: DobotError) -> None:
         """Ends the waiting of one party alone."""
-        for claim in [claim for claim in self._waiting if claim.party is party]:
-            self._waiting.remove(claim)
-            claim.answer(error)
-
-        self.settle()
+        self._end(lambda claim: claim.party is party, error)
 
     def settle(self) -> None:
         """Answers all that can be answered; to be called when a party has failed."""
@@ -136,6 +191,16 @@ class Claims:
             claim, error = refused
             self._waiting.remove(claim)
             claim.answer(error)
+
+    def _end(self, concerned: Callable[[Claim], bool], error: DobotError) -> None:
+        """Ends the waiting of some claims."""
+        for claim in filter(concerned, (*self._waiting, *self._prepared)):
+            if claim in self._waiting:
+                self._waiting.remove(claim)
+
+            claim.answer(error)
+
+        self.settle()
 
     def _foreign(self, claim: Claim) -> Iterator[tuple[Party, str]]:
         """Who stands in the way of a claim, and in which zone; who is in a zone may move in it, even beside others."""
@@ -157,20 +222,34 @@ class Claims:
         earlier = self._waiting[: self._waiting.index(claim)]
         return [each for each in earlier if not each.zones.isdisjoint(claim.zones)]
 
-    def _behind(self, claim: Claim) -> set[Claim]:
-        """All claims that a claim waits for, directly or not."""
-        found: set[Claim] = set()
-        todo = [claim]
+    def _behind(self, claim: Claim) -> set[Wait]:
+        """All that a claim waits for, directly or not."""
+        found: set[Wait] = set()
+        todo: list[Wait] = [claim]
         while todo:
             each = todo.pop()
-            parties = {party for party, _ in self._foreign(each)}
-            blocked = [other for other in self._waiting if not other.stuck.isdisjoint(parties)]
-            for other in blocked + self._before(each):
+            ends_before = [self._held_up(obstacle) for obstacle, _ in self._obstacles(each)]
+            earlier = self._before(each) if isinstance(each, Claim) else []
+            for other in (*chain.from_iterable(ends_before), *earlier):
                 if other not in found:
                     found.add(other)
                     todo.append(other)
 
         return found
+
+    def _obstacles(self, wait: Wait) -> Iterator[Obstacle]:
+        """What keeps a wait from ending."""
+        if isinstance(wait, Pause):
+            for party in wait.awaited():
+                yield partial(keeps_away, party), f"{wait.what} {party.name}"
+        else:
+            for party, zone in self._foreign(wait):
+                yield partial(keeps_in, party), f"for zone {zone}, which {party.name} holds"
+
+    def _held_up(self, obstacle: Callable[[Wait], bool]) -> list[Wait]:
+        """The waits that have to end before an obstacle goes."""
+        waits: list[Wait] = [*self._waiting, *self._pauses]
+        return [wait for wait in waits if obstacle(wait)]
 
     def _hopeless(self) -> Iterator[tuple[Claim, DobotError]]:
         """Claims that wait for somebody who has failed, or for themselves."""
@@ -184,21 +263,22 @@ class Claims:
 
             cycle = self._cycle(claim) if claim.patient else []
             if cycle:
-                yield claim, ZoneDeadlock(f"a deadlock: {'; '.join(cycle)}")
+                yield claim, deadlock(cycle)
 
-    def _cycle(self, claim: Claim) -> list[str]:
-        """The waits that lead from a claim back to itself, in words; empty if they do not."""
-        ways: list[tuple[Claim, list[str]]] = [(claim, [])]
-        seen: set[Claim] = set()
+    def _cycle(self, start: Wait) -> list[str]:
+        """The waits that lead from one back to itself, in words; empty if they do not."""
+        ways: list[tuple[Wait, list[str]]] = [(start, [])]
+        seen: set[Wait] = set()
         while ways:
             each, words = ways.pop(0)
-            for party, zone in self._foreign(each):
-                told = [*words, f"{each.party.name} waits for zone {zone}, which {party.name} holds"]
-                if party in claim.stuck:
+            who = each.party if isinstance(each, Claim) else each.asker
+            for obstacle, why in self._obstacles(each):
+                told = [*words, f"{who.name} waits {why}"]
+                if obstacle(start):
                     return told
 
-                for other in self._waiting:
-                    if party in other.stuck and other not in seen:
+                for other in self._held_up(obstacle):
+                    if other not in seen:
                         seen.add(other)
                         ways.append((other, told))
 
@@ -208,3 +288,18 @@ class Claims:
         """Why a claim has to wait, in words."""
         held = [f"{party.name} holds zone {zone}" for party, zone in self._foreign(claim)]
         return "; ".join(held) or f"others wait for {', '.join(sorted(claim.zones))}"
+
+
+def keeps_in(party: Party, wait: Wait) -> bool:
+    """Whether a party that holds a zone leaves it only when a wait has ended."""
+    return party in wait.stuck and not party.moving()
+
+
+def keeps_away(party: Party, wait: Wait) -> bool:
+    """Whether a party does what is awaited of it only when a wait has ended."""
+    return party is wait.asker
+
+
+def deadlock(cycle: Collection[str]) -> ZoneDeadlock:
+    """What to raise for a cycle of waits."""
+    return ZoneDeadlock(f"a deadlock: {'; '.join(cycle)}")

@@ -42,7 +42,7 @@ class Crew(Generic[A]):
         self.failures: dict[str, DobotError] = {}
         self._groups = groups
         self._zones = Zones(dict(zones), {name: Party(name) for name in members})
-        self._barriers = Barriers()
+        self._barriers = Barriers(self._zones.claims)
         self._seats = {
             name: Seat(name, member, self._zones, self._fail, self._works) for name, member in members.items()
         }
@@ -88,14 +88,14 @@ class Crew(Generic[A]):
 
         return self._seats[name]
 
-    def _affected(self, name: str) -> Collection[str]:
+    def _affected(self, name: str) -> Collection[Seat]:
         """The arms that stop when one fails, itself among them unless it fails alone."""
         group = self._seats[name].member.group
         reach = self._groups[group] if group else "fleet"
         if reach == "alone":
             return ()
 
-        return [each for each, seat in self._seats.items() if reach == "fleet" or seat.member.group == group]
+        return [seat for seat in self._seats.values() if reach == "fleet" or seat.member.group == group]
 
     def _ends(self, name: str, error: BaseException) -> bool:
         """Whether a failure in the work of an arm cancels the work of the others."""
@@ -112,20 +112,24 @@ class Crew(Generic[A]):
         self._zones.drop(failed.party)
         self._zones.claims.fail([failed.party], error)
         self._barriers.fail(failed.name, str(error))
-        for name in self._affected(failed.name):
-            seat = self._seats[name]
-            if seat.stopped:
+        affected = [seat for seat in self._affected(failed.name) if not seat.stopped]
+        others = [seat for seat in affected if seat is not failed]
+        for seat in others:
+            seat.shout()
+
+        if failed in affected:
+            failed.stopped = MotionStopped(f"{failed.name} does not move, for it has failed: {error}")
+
+        for seat in others:
+            seat.stopped = MotionStopped(f"{seat.name} was stopped because another arm failed: {error}")
+            if seat.arm is None:
                 continue
 
-            if seat is failed:
-                seat.stopped = MotionStopped(f"{name} does not move, for it has failed: {error}")
-            else:
-                seat.stopped = MotionStopped(f"{name} was stopped because another arm failed: {error}")
-                seat.queue.fail(seat.stopped)
-                self._zones.claims.fail([seat.party], seat.stopped)
-                task = asyncio.create_task(self._halt(seat), name=f"dobot_async {name} stop")
-                self._stopping.add(task)
-                task.add_done_callback(self._stopping.discard)
+            seat.queue.fail(seat.stopped)
+            self._zones.claims.fail([seat.party], seat.stopped)
+            task = asyncio.create_task(self._halt(seat), name=f"dobot_async {seat.name} stop")
+            self._stopping.add(task)
+            task.add_done_callback(self._stopping.discard)
 
     def _works(self, seat: Seat) -> None:
         """An arm may move, whatever it has failed with before."""

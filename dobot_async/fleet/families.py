@@ -3,7 +3,7 @@
     arm.queue.put_all --> Overseer.admitted --> the arm
     arm.queue.fail    --> Overseer.ended
 
-A family is one entry of `FAMILIES`, by its public class.
+A family is one of `FAMILIES`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any, Protocol, cast
 
 from dobot_async.errors import DobotError
 from dobot_async.executor import Entry
+from dobot_async.families import Each
 from dobot_async.fleet.frames import Place
 from dobot_async.magician import commands as magician
 from dobot_async.magician.arm import Jog, Magician
@@ -25,8 +26,9 @@ from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.queue import CobotBatch, CobotQueue
 from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
 from dobot_async.ultraarm.queue import UltraArmBatch, UltraArmQueue
+from dobot_async.wire import Command
 
-__all__ = ["FAMILIES", "AnyArm", "Family", "FleetQueue", "Overseer", "family_of"]
+__all__ = ["FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "AnyArm", "Family", "FleetQueue", "Overseer", "family_of"]
 
 AnyArm = Magician | MyCobot | UltraArm
 PLENTY = 1000
@@ -143,15 +145,18 @@ class Family:
     """What the fleet has to know of a family.
 
     Attributes:
+        arm: Its public class.
         name: Its word in a cell file.
         kind: Its class in a fleet.
         batch: Makes an empty batch for a queue.
+        stop: The command that stops it and may be sent twice; None if its answer could pass for another one's.
         ask: A cheap question, for measuring how long an answer takes.
         place: Tells where the tool is.
         room: Tells how many commands the queue can take while it is paused.
         pauses: Whether its queue can be paused.
     """
 
+    arm: type[Any]
     name: str
     kind: type[Any]
     batch: Callable[[Any], Any]
@@ -159,6 +164,7 @@ class Family:
     place: Callable[[Any], Awaitable[Place]]
     room: Callable[[Any], Awaitable[int]]
     pauses: bool = True
+    stop: Command[None, Any] | None = None
 
 
 async def magician_place(arm: Magician) -> Place:
@@ -178,40 +184,47 @@ async def plenty(_: object) -> int:
     return PLENTY
 
 
-FAMILIES: dict[type[Any], Family] = {
-    Magician: Family(
-        name="magician",
-        kind=FleetMagician,
-        batch=lambda arm: Batch(arm.queue),
-        ask=lambda arm: cast(Magician, arm).request(magician.GET_QUEUED_CMD_CURRENT_INDEX, None),
-        place=magician_place,
-        room=lambda arm: cast(Magician, arm).request(magician.GET_QUEUED_CMD_LEFT_SPACE, None),
-    ),
-    MyCobot: Family(
-        name="mycobot",
-        kind=FleetMyCobot,
-        batch=lambda arm: CobotBatch(arm.queue, arm.model),
-        ask=lambda arm: cast(MyCobot, arm).request(mycobot.IS_POWER_ON, None),
-        place=coords_place,
-        room=plenty,
-    ),
-    UltraArm: Family(
-        name="ultraarm",
-        kind=FleetUltraArm,
-        batch=lambda arm: UltraArmBatch(arm.queue, arm.pump),
-        ask=lambda arm: cast(UltraArm, arm).get_queue_size(),
-        place=coords_place,
-        room=plenty,
-        pauses=False,
-    ),
-}
+MAGICIAN = Family(
+    arm=Magician,
+    name="magician",
+    kind=FleetMagician,
+    batch=lambda arm: Batch(arm.queue),
+    ask=lambda arm: cast(Magician, arm).request(magician.GET_QUEUED_CMD_CURRENT_INDEX, None),
+    place=magician_place,
+    room=lambda arm: cast(Magician, arm).request(magician.GET_QUEUED_CMD_LEFT_SPACE, None),
+    stop=magician.SET_QUEUED_CMD_FORCE_STOP_EXEC,
+)
+
+MYCOBOT = Family(
+    arm=MyCobot,
+    name="mycobot",
+    kind=FleetMyCobot,
+    batch=lambda arm: CobotBatch(arm.queue, arm.model),
+    ask=lambda arm: cast(MyCobot, arm).request(mycobot.IS_POWER_ON, None),
+    place=coords_place,
+    room=plenty,
+)
+
+ULTRAARM = Family(
+    arm=UltraArm,
+    name="ultraarm",
+    kind=FleetUltraArm,
+    batch=lambda arm: UltraArmBatch(arm.queue, arm.pump),
+    ask=lambda arm: cast(UltraArm, arm).get_queue_size(),
+    place=coords_place,
+    room=plenty,
+    pauses=False,
+)
+
+FAMILIES: Each[Family] = Each("fleet")
+"""All of them."""
 
 
 def family_of(kind: type[Any]) -> Family:
     """Returns what a fleet knows of a class of arms; raises ValueError for another class."""
-    found = FAMILIES.get(kind)
+    found = next((family for family in FAMILIES if family.arm is kind), None)
     if found is None:
-        names = ", ".join(each.__name__ for each in FAMILIES)
+        names = ", ".join(family.arm.__name__ for family in FAMILIES)
         raise ValueError(f"a fleet has arms of the families {names}, not {kind!r}")
 
     return found

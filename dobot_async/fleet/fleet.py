@@ -199,7 +199,10 @@ class Fleet(Crew[A]):
         Raises:
             DobotError: An arm could not be stopped; the others were.
         """
-        await undisturbed(all_of({name: seat.arm.stop() for name, seat in self._seats.items()}))
+        for seat in self._seats.values():
+            seat.shout()
+
+        await undisturbed(all_of({name: seat.stop() for name, seat in self._seats.items()}))
 
     async def recover(self) -> None:
         """Makes all arms ready again after a failure: clears alarms and queues, and lets them move.
@@ -229,11 +232,11 @@ class Fleet(Crew[A]):
             BaseException: The first failure, when all have ended; the others were cancelled, unless the group of the
                 arm that failed lets them go on.
         """
-        parent, run = here(), Run(frozenset(programs))
+        parent, run = here(), Run({name: Party(f"program {name}") for name in programs})
 
         async def ran(name: str, program: Coroutine[Any, Any, T]) -> T:
             arm = name if name in self._seats else None
-            part = Program(Party(f"program {name}"), asyncio.current_task(), parent, arm, run)
+            part = Program(run.parties[name], asyncio.current_task(), parent, arm, run)
             if arm:
                 self._zones.drivers[arm] = part.task
 
@@ -266,11 +269,13 @@ class Fleet(Crew[A]):
 
         Raises:
             BarrierBroken: One of them failed, ended or gave up; it stays broken for the run, or until `recover`.
+            ZoneDeadlock: Among programs of a `run`: one of them waits, in the end, for a zone that this one holds.
             ReplyTimeout: They did not all come in time.
         """
-        run = next((each.run for each in here().line() if each.run), None)
-        names = parties or (run.parties if run else self._seats)
-        await self._barriers.wait(name, frozenset(names), run=run, timeout=timeout)
+        program = here()
+        part = program.part()
+        names = parties or (part.run.parties if part and part.run else self._seats)
+        await self._barriers.wait(name, frozenset(names), program, self._zones.driven(program), timeout)
 
     def zone(self, name: str, *arms: str, timeout: float | None = None) -> AbstractAsyncContextManager[None]:
         """Holds a zone for the length of a block; nobody else does.

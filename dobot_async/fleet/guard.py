@@ -21,7 +21,7 @@ from dobot_async.errors import DobotError
 from dobot_async.executor import Entry
 from dobot_async.fleet.claims import Claim, Party
 from dobot_async.fleet.families import Family
-from dobot_async.fleet.frames import BaseFrame
+from dobot_async.fleet.frames import BaseFrame, Place
 from dobot_async.fleet.paths import STEP, XYZ, Lift, reach_of, way_of
 from dobot_async.fleet.shapes import Box
 from dobot_async.fleet.zones import Zones, here
@@ -84,7 +84,9 @@ class Guard:
         self._standing: frozenset[str] = frozenset()
         self._located = False
         self._roaming = False
+        self._looking = 0
         self._plans = 0
+        party.moving = lambda: bool(steps or self._roaming or self._looking)
 
     async def admit(self, batch: Mapping[Entry, Motion], deadline: float | None) -> None:
         """Returns when the arm may do a batch, and enters it.
@@ -172,20 +174,29 @@ class Guard:
 
     async def locate(self) -> None:
         """Finds out where the arm stands once it does; raises DobotError if it does not tell."""
-        plans, before = self._plans, await self._family.place(self._arm)
-        while True:
-            await asyncio.sleep(BETWEEN_READINGS)
-            place = await self._family.place(self._arm)
-            if math.dist(before[:3], place[:3]) < AT_REST:
-                break
+        plans = self._plans
+        self._looking += 1
+        try:
+            place = await self._rest()
+            joints = await self._read_joints()
+        finally:
+            self._looking -= 1
 
-            before = place
-
-        joints = await self._read_joints()
         if plans == self._plans:
             self._joints, self._located = joints, True
             self._standing = frozenset(self._around([place[:3]]))
             self._settle()
+
+    async def _rest(self) -> Place:
+        """Where the arm stands, once it does."""
+        before = await self._family.place(self._arm)
+        while True:
+            await asyncio.sleep(BETWEEN_READINGS)
+            place = await self._family.place(self._arm)
+            if math.dist(before[:3], place[:3]) < AT_REST:
+                return place
+
+            before = place
 
     def _forget(self) -> None:
         """Drops steps that have failed; the arm may be anywhere on their way."""
@@ -262,7 +273,14 @@ class Guard:
         self._zones.drivers[self._party.name] = program.task
         # Only its own programs let it in: two arms that one program moves must not meet, either.
         own = frozenset(each.party for each in program.line()) | {self._party}
-        claim = Claim(self._party, own, zones, patient=self._mode == "wait", stuck=self._zones.driven(program))
+        claim = Claim(
+            self._party,
+            own,
+            zones,
+            patient=self._mode == "wait",
+            stuck=self._zones.driven(program),
+            asker=program.party,
+        )
         left = None if deadline is None else max(0.0, deadline - asyncio.get_running_loop().time())
         return await self._zones.claim(claim, left)
 
@@ -275,9 +293,7 @@ class Guard:
             self._claims.append(claim)
             self._zones.claims.take(claim)
 
-        for claim in self._claims:
-            self._zones.claims.release(claim, claim.zones - needed)
-
+        self._zones.claims.keep(self._claims, needed)
         self._claims = [claim for claim in self._claims if claim.zones]
 
 

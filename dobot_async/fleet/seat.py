@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import asynccontextmanager, nullcontext, suppress
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from contextlib import ExitStack, asynccontextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -14,12 +14,13 @@ import anyio
 from dobot_async.contract import LinkState
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.executor import Entry
+from dobot_async.fleet.claims import Party, Pause
 from dobot_async.fleet.families import Family, FleetQueue, family_of
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.guard import Guard, Mode, Step
 from dobot_async.fleet.shapes import Box
 from dobot_async.fleet.work import named
-from dobot_async.fleet.zones import Zones
+from dobot_async.fleet.zones import Zones, here
 from dobot_async.motion import Motion
 
 __all__ = ["Member", "Seat"]
@@ -92,6 +93,7 @@ class Seat:
         self._guard: Guard | None = None
         self._steps: deque[Step] = deque()
         self._order = anyio.Lock(fast_acquire=True)
+        self._commanding: tuple[Party, ...] = ()
         self._halts = 0
         self._halted: DobotError = MotionStopped("the arm was stopped")
         self._quiet = False
@@ -161,8 +163,12 @@ class Seat:
     async def roaming(self) -> AsyncIterator[None]:
         """While this is entered, the arm may go anywhere."""
         self.check()
-        async with self._order, self._guard.roaming() if self._guard else nullcontext():
-            yield
+        await self._take_turn()
+        try:
+            async with self._guard.roaming() if self._guard else nullcontext():
+                yield
+        finally:
+            self._order.release()
 
     def ended(self, error: DobotError) -> None:
         """Takes note of what ends all motions of the arm; whatever is no stop is a failure."""
@@ -183,6 +189,22 @@ class Seat:
 
         if halts is not None and halts != self._halts:
             raise self._halted.with_traceback(None)
+
+    def shout(self) -> None:
+        """Tells the arm to stop before this returns, if its link can; `stop` is to follow at once."""
+        if self.arm and self.family.stop:
+            self.arm.link.shout(self.family.stop)
+
+    def stop(self) -> Coroutine[Any, Any, None]:
+        """Returns what stops the arm; from now on none of its motions counts as done."""
+        stopping = ExitStack()
+        stopping.enter_context(self.queue.stopping(MotionStopped("the arm was stopped")))
+
+        async def stop() -> None:
+            with stopping:
+                await self.arm.stop()
+
+        return stop()
 
     def quiet(self, quiet: bool) -> None:
         """Says whether the arm is to be left alone for now, although it has motions that nobody awaits."""
@@ -210,7 +232,7 @@ class Seat:
         halts = self._halts
         try:
             async with asyncio.timeout_at(deadline):
-                await self._order.acquire()
+                await self._take_turn()
         except TimeoutError:
             raise ReplyTimeout(f"{self.name}: others were before it, and took too long") from None
 
@@ -227,6 +249,16 @@ class Seat:
             raise
 
         self._works(self)
+
+    async def _take_turn(self) -> None:
+        """Takes the lock of the order; raises ZoneDeadlock if who has it waits, in the end, for who asks."""
+        program = here()
+        stuck = self._zones.driven(program) | {program.party}
+        turn = Pause(f"to command {self.name} behind", program.party, stuck, lambda: self._commanding)
+        with self._zones.claims.pausing(turn) if self._order.locked() else nullcontext():
+            await self._order.acquire()
+
+        self._commanding = (program.party,)
 
     async def _follow(self) -> None:
         """Takes the steps as their motions end."""

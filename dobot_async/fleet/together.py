@@ -111,19 +111,19 @@ async def launch(seats: Mapping[str, Seat], batches: Mapping[str, Any], timeout:
 
     await side_by_side({name: seat.queue.join(timeout) for name, seat in seats.items()})
     latency = await side_by_side({name: measure(seat) for name, seat in seats.items()})
-    first, rest = {}, {}
     for seat in seats.values():
         seat.quiet(True)
 
     try:
-        await side_by_side({name: seat.queue.pause() for name, seat in seats.items() if seat.family.pauses})
-        for name, seat in seats.items():
+        pausing = {name: seat for name, seat in seats.items() if seat.family.pauses}
+        await side_by_side({name: seat.queue.pause() for name, seat in pausing.items()})
+        rooms = await side_by_side({name: room(seat) for name, seat in pausing.items()})
+        first, rest = {}, {}
+        for name in seats:
             motions = batches[name].motions
-            room = await seat.family.room(seat.arm) if seat.family.pauses else 1
-            first[name] = dict(islice(motions.items(), max(1, room - 1)))
+            first[name] = dict(islice(motions.items(), max(1, rooms.get(name, 1) - 1)))
             rest[name] = dict(islice(motions.items(), len(first[name]), None))
 
-        pausing = {name: seat for name, seat in seats.items() if seat.family.pauses}
         await side_by_side({name: seat.queue.put_all(first[name], timeout=timeout) for name, seat in pausing.items()})
         instant = asyncio.get_running_loop().time() + LEAD + max(latency.values())
         told = await side_by_side(
@@ -142,6 +142,11 @@ async def launch(seats: Mapping[str, Seat], batches: Mapping[str, Any], timeout:
     return Start(at, latency, max(answered - sent for sent, answered in told.values()) / 2)
 
 
+async def room(seat: Seat) -> int:
+    """Returns how many commands an arm takes while it is paused."""
+    return await seat.family.room(seat.arm)
+
+
 async def measure(seat: Seat) -> float:
     """Returns how many seconds a message takes to an arm: half of a typical round trip."""
     loop = asyncio.get_running_loop()
@@ -157,17 +162,12 @@ async def measure(seat: Seat) -> float:
 async def release(seat: Seat, when: float, motions: Mapping[Any, Any]) -> tuple[float, float]:
     """Starts one arm at a time; returns when that was sent, and when it was answered."""
     loop = asyncio.get_running_loop()
-    due: asyncio.Future[None] = loop.create_future()
-    timer = loop.call_at(when, due.set_result, None)
-    try:
-        await due
-        sent = loop.time()
-        if seat.family.pauses:
-            await seat.queue.resume()
-        else:
-            await seat.queue.put_all(motions)
-    finally:
-        timer.cancel()
+    await asyncio.sleep(when - loop.time())
+    sent = loop.time()
+    if seat.family.pauses:
+        await seat.queue.resume()
+    else:
+        await seat.queue.put_all(motions)
 
     return sent, loop.time()
 

@@ -85,7 +85,10 @@ def cancel(tasks: set[asyncio.Task[Any]]) -> None:
 
 
 async def end(tasks: set[asyncio.Task[Any]]) -> None:
-    """Cancels all, and waits for their end."""
+    """Cancels all, and waits for their end, however it is."""
     cancel(tasks)
     if tasks:
         await asyncio.wait(tasks)
+
+    for task in tasks:
+        failure(task)  # asyncio complains of one that nobody looks at

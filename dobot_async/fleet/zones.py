@@ -25,10 +25,10 @@ class Run:
     """Programs that run side by side.
 
     Attributes:
-        parties: Their names.
+        parties: As what they hold zones, by name.
     """
 
-    parties: frozenset[str]
+    parties: Mapping[str, Party]
 
 
 @dataclass(eq=False)
@@ -56,17 +56,23 @@ class Program:
             yield program
             program = program.parent
 
+    def part(self) -> Program | None:
+        """Returns the program of a run that it is, or acts for."""
+        return next((each for each in self.line() if each.run), None)
+
 
 current: ContextVar[Program | None] = ContextVar("dobot_async program", default=None)
 
 
 def here() -> Program:
-    """Returns the program that runs now."""
+    """Returns the program that runs now, always the same one in a task."""
     found, task = current.get(), asyncio.current_task()
     if found and found.task is task:
         return found
 
-    return Program(Party(task.get_name() if task else "nobody"), task, found)
+    program = Program(Party(task.get_name() if task else "nobody"), task, found)
+    current.set(program)
+    return program
 
 
 @contextmanager
@@ -139,9 +145,6 @@ class Zones:
             ZoneDeadlock: It would wait for itself.
             ReplyTimeout: It had to wait for too long.
         """
-        for catch_up in self.guards:
-            await catch_up()
-
         answered: asyncio.Future[DobotError | None] = asyncio.get_running_loop().create_future()
 
         def answer(error: DobotError | None) -> None:
@@ -149,9 +152,14 @@ class Zones:
                 answered.set_result(error)
 
         claim.answer = answer
-        self.claims.request(claim)
         try:
             async with asyncio.timeout(timeout):
+                with self.claims.preparing(claim):
+                    await asyncio.gather(*(catch_up() for catch_up in self.guards))
+
+                if not answered.done():
+                    self.claims.request(claim)
+
                 error = await answered
         except BaseException as failure:
             self.claims.release(claim)

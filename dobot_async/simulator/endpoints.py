@@ -23,11 +23,8 @@ from weakref import WeakValueDictionary
 import anyio
 
 from dobot_async.errors import ConnectFailed
-from dobot_async.mycobot.models import MODELS as COBOTS
+from dobot_async.families import Parts
 from dobot_async.simulator.faults import PROBABILITIES, TIMES, Channel, Faults
-from dobot_async.simulator.magician import SimulatedMagician
-from dobot_async.simulator.mycobot import SimulatedMyCobot
-from dobot_async.simulator.ultraarm import SimulatedUltraArm
 from dobot_async.transports.base import MANY, Transport, options
 from dobot_async.transports.baud import AtBaud
 from dobot_async.transports.listen import on_tcp, on_udp
@@ -35,12 +32,7 @@ from dobot_async.transports.terminal import on_pty
 
 __all__ = ["MODELS", "Simulation", "open_url", "simulate"]
 
-MODELS: dict[str, Callable[..., Any]] = {
-    "magician": SimulatedMagician,
-    "mycobot": SimulatedMyCobot,
-    **{model: partial(SimulatedMyCobot, model=model) for model in COBOTS},
-    "ultraarm": SimulatedUltraArm,
-}
+MODELS: Parts[Callable[..., Any]] = Parts("simulator")
 """The simulated arms by name: each is made with a clock, and has a `session()` for each client."""
 BLE_OPTIONS = {"name": str, "address": str, "interval": float, "mtu": int, "packets": int}
 PTY_OPTIONS = {"baud": int}
@@ -285,6 +277,15 @@ class MemoryTransport:
             raise anyio.BrokenResourceError
 
         self._client.send(data)
+
+    def write(self, data: bytes) -> bool:
+        """Puts a request on the line; False if it is gone."""
+        ends = self._arriving.statistics()
+        if ends.open_receive_streams and ends.open_send_streams:
+            self._client.send(data)
+            return True
+
+        return False
 
     async def receive(self) -> bytes:
         """Returns the next message."""

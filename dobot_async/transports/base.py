@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, NoReturn, Protocol, runtime_checkable
 from urllib.parse import SplitResult, parse_qsl
 
-__all__ = ["MANY", "Transport", "Wrapped", "options", "pump"]
+__all__ = ["MANY", "Transport", "Wrapped", "options", "prompt", "pump"]
 
 MANY = 8
 """Unanswered requests that a byte stream carries at a time: a handful fits the arm's own input buffer."""
@@ -57,6 +57,14 @@ class Delivering(Protocol):
         """Calls `take` with what arrives, until the transport ends; then raises as `receive`."""
 
 
+@runtime_checkable
+class Prompt(Protocol):
+    """A transport that need not be awaited to send, as long as its output is not full."""
+
+    def write(self, data: bytes) -> bool:
+        """Sends all bytes of one frame before it returns; False if it cannot, and has sent nothing."""
+
+
 class Stream(Protocol):
     """What anyio's sockets and memory streams have in common."""
 
@@ -98,6 +106,11 @@ def options(url: SplitResult, known: Mapping[str, Callable[[str], Any]]) -> dict
             raise ValueError(f"{name}={text!r} is no {known[name].__name__}") from None
 
     return found
+
+
+def prompt(transport: Transport) -> Callable[[bytes], bool]:
+    """Returns what sends a frame before it returns; its answer is False where that cannot be done."""
+    return transport.write if isinstance(transport, Prompt) else lambda _: False
 
 
 async def pump(transport: Transport, take: Callable[[bytes], None]) -> NoReturn:

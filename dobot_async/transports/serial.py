@@ -98,13 +98,18 @@ class SerialTransport(asyncio.Protocol):
     async def send(self, data: bytes) -> None:
         """Writes one frame; waits while the output is full."""
         self._check()
-        rest = self._written(data)
-        if rest:
-            self._transport.write(rest)
-
+        self._put(data)
         if not self._writable.is_set():
             await self._writable.wait()
             self._check()
+
+    def write(self, data: bytes) -> bool:
+        """Writes one frame now; False if the output is full or the port is gone."""
+        if self._closing or self._lost.done() or not self._writable.is_set():
+            return False
+
+        self._put(data)
+        return True
 
     async def receive(self) -> bytes:
         """Returns what has arrived, at least one byte."""
@@ -181,6 +186,12 @@ class SerialTransport(asyncio.Protocol):
     def resume_writing(self) -> None:
         """The output has room again."""
         self._writable.set()
+
+    def _put(self, data: bytes) -> None:
+        """Hands bytes to the port, and what it does not take at once to its output."""
+        rest = self._written(data)
+        if rest:
+            self._transport.write(rest)
 
     def _written(self, data: bytes) -> bytes:
         """Writes what the port takes at once, and returns the rest.

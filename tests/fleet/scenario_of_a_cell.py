@@ -12,20 +12,20 @@ import asyncio
 import signal
 import sys
 import warnings
-from collections.abc import Coroutine, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AsyncExitStack, contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from random import Random
 from typing import Any
 
 import async_solipsism
 
 from dobot_async import ConnectionLost, DobotError, Fleet, Magician, PTPMode
-from dobot_async.fleet import BaseFrame, Box, Cylinder, Member
+from dobot_async.fleet import BaseFrame, Box, Cylinder, Member, ZoneDeadlock
 from dobot_async.fleet.shapes import Shape
 from dobot_async.simulator import Faults, Simulation, simulate
 
-__all__ = ["Violation", "run_seed"]
+__all__ = ["Figures", "Violation", "run_seed"]
 
 ZONES: dict[str, Shape | None] = {
     "low": Box(x=(200, 260), y=(-30, 30), z=(0, 70)),
@@ -42,12 +42,29 @@ NAMES = "abcde"
 LONG = 2000.0  # virtual seconds after which somebody hangs
 STANDING = 1.0  # virtual seconds after a failure until everybody stands still
 TICK = 0.01
-WALL = 60
+PATIENCE = 60.0  # seconds of the processor after which a run never ends
 TRIES = 20
 
 
 class Violation(AssertionError):
     """What must hold does not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What happened in a run.
+
+    Attributes:
+        seconds: Simulated ones.
+        told: Errors that programs were told of.
+        deadlocks: How many of them were deadlocks.
+        failures: Arms that failed.
+    """
+
+    seconds: float
+    told: int
+    deadlocks: int
+    failures: int
 
 
 @dataclass
@@ -59,7 +76,8 @@ class Run:
     fleet: Fleet[Magician]
     steps: int
     meets: bool
-    seen: list[str] = field(default_factory=list)
+    say: Callable[[str], None]
+    told: list[DobotError] = field(default_factory=list)
 
     async def play(self) -> None:
         """Runs all programs under the eyes of an observer."""
@@ -100,7 +118,8 @@ class Run:
             try:
                 await self.step(name, random)
             except DobotError as error:
-                self.seen.append(type(error).__name__)
+                self.told.append(error)
+                self.say(f"{asyncio.get_running_loop().time():8.3f} {name}: {type(error).__name__}: {error}")
                 if self.fleet.failures:
                     raise
 
@@ -168,8 +187,9 @@ class Run:
     async def observe(self) -> None:
         """Looks at where all tools are, all the time; arms that have failed are nobody's to move any more."""
         while True:
+            tools = {name: self.tool(name) for name in NAMES}
             for zone, shape in ZONES.items():
-                inside = [name for name in NAMES if shape and shape.contains(*self.tool(name))]
+                inside = [name for name, tool in tools.items() if shape and shape.contains(*tool)]
                 if len(inside) > 1:
                     raise Violation(f"{inside} are in zone {zone}")
 
@@ -184,9 +204,9 @@ class Run:
         return {zone: self.fleet.holders(zone) for zone in ZONES}
 
 
-async def run(seed: int) -> list[str]:
-    """Runs a seed; returns what went wrong in it that programs were told of."""
-    random = Random(seed)
+async def run(seed: int, say: Callable[[str], None]) -> Figures:
+    """Runs a seed; returns what happened, and says which errors programs are told of."""
+    random, loop = Random(seed), asyncio.get_running_loop()
     async with AsyncExitStack() as stack:
         sims = {}
         for number, name in enumerate(NAMES):
@@ -204,52 +224,53 @@ async def run(seed: int) -> list[str]:
         for arm in NAMES:
             await fleet[arm].set_speed(random.choice([20, 50, 100]))
 
-        under_way = Run(random, sims, fleet, random.randint(3, 9), random.random() < 0.5)
+        under_way = Run(random, sims, fleet, random.randint(3, 9), random.random() < 0.5, say)
         await under_way.play()
-        return under_way.seen
+        told = under_way.told
+        deadlocks = sum(isinstance(error, ZoneDeadlock) for error in told)
+        return Figures(loop.time(), len(told), deadlocks, len(fleet.failures))
 
 
 @contextmanager
 def not_for_ever() -> Iterator[None]:
-    """Fails a run that never ends although its clock is virtual."""
+    """Fails a run that never ends although its clock is virtual. That others have the processor does not count."""
 
     def end(*_: object) -> None:
         raise Violation("it never ends")
 
-    before = signal.signal(signal.SIGALRM, end)
-    signal.alarm(WALL)
+    before = signal.signal(signal.SIGVTALRM, end)
+    signal.setitimer(signal.ITIMER_VIRTUAL, PATIENCE)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
 
 
-def run_seed(seed: int) -> list[str]:
+def run_seed(seed: int, say: Callable[[str], None] = lambda _: None) -> Figures:
     """Runs a seed; raises Violation if something does not hold."""
-    seen: list[str] = []
 
-    async def checked(work: Coroutine[Any, Any, list[str]]) -> None:
-        seen.extend(await work)
+    async def checked() -> Figures:
+        figures = await run(seed, say)
         left = asyncio.all_tasks() - {asyncio.current_task()}
         if left:
             raise Violation(f"left behind: {left}")
 
-    with not_for_ever(), asyncio.Runner(loop_factory=async_solipsism.EventLoop) as runner:
-        runner.run(checked(run(seed)))
+        return figures
 
-    return seen
+    with not_for_ever(), asyncio.Runner(loop_factory=async_solipsism.EventLoop) as runner:
+        return runner.run(checked())
 
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    counts: dict[str, int] = {}
+    counts: dict[str, float] = {}
     for number in range(int(sys.argv[1]), int(sys.argv[2]) + 1):
         try:
-            for name in run_seed(number):
-                counts[name] = counts.get(name, 0) + 1
+            for name, figure in asdict(run_seed(number)).items():
+                counts[name] = counts.get(name, 0) + figure
         except Exception as error:  # noqa: BLE001 - whatever it is, it is this seed's
             sys.stdout.write(f"seed {number}: {type(error).__name__}: {error}\n")
             sys.stdout.flush()
 
-    sys.stdout.write(f"done; told: {counts}\n")
+    sys.stdout.write(f"done: {counts}\n")

@@ -11,7 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from dobot_async import DobotError, MotionStopped
 from dobot_async.fleet import ZoneDeadlock, ZoneOccupied
-from dobot_async.fleet.claims import Claim, Claims, Party
+from dobot_async.fleet.claims import Claim, Claims, Party, Pause
 
 ZONES = "ABC"
 
@@ -215,9 +215,47 @@ def test_parts_are_released() -> None:
     claims = Claims()
     both = ask(claims, LEFT, "AB")
     waiting = ask(claims, RIGHT, "A")
-    claims.release(both, "A")
+    claims.keep([both], frozenset("B"))
     assert waiting.granted
     assert claims.holders("B") == [LEFT]
+
+
+def test_what_a_party_leaves_with_several_claims_it_leaves_at_once() -> None:
+    moving = True
+    arm = Party("arm", moving=lambda: moving)
+    claims = Claims()
+    held = [ask(claims, arm, "A"), ask(claims, arm, "A")]
+    ask(claims, RIGHT, "B")
+    own, other = ask(claims, arm, "B"), ask(claims, RIGHT, "A")
+    moving = False
+    claims.keep(held, frozenset())
+    assert other.granted
+    assert not own.told
+
+
+def test_an_arm_that_moves_may_leave_a_zone_by_itself() -> None:
+    moving = True
+    arm = Party("arm", moving=lambda: moving)
+    claims = Claims()
+    for party, zone in ((arm, "A"), (RIGHT, "B")):
+        ask(claims, party, zone)
+
+    own, other = ask(claims, arm, "B"), ask(claims, RIGHT, "A")
+    assert not own.told
+    assert not other.told
+    moving = False
+    claims.settle()
+    assert isinstance(other.told[0], ZoneDeadlock)
+    assert not own.told
+
+
+def test_a_claim_passes_one_that_waits_at_a_barrier_for_who_asks() -> None:
+    claims = Claims()
+    ask(claims, LEFT, "A")
+    earlier = ask(claims, MIDDLE, "AB")
+    with claims.pausing(Pause("at a barrier for", LEFT, frozenset([LEFT]), lambda: [RIGHT])):
+        assert ask(claims, RIGHT, "B").granted
+        assert not earlier.told
 
 
 def test_waiting_can_be_ended() -> None:

@@ -169,6 +169,66 @@ async def test_stop_goes_to_all_at_once() -> None:
 
 
 @virtual
+async def test_a_stop_is_on_every_line_before_anything_is_awaited() -> None:
+    async with cell("left", "right", speed=1) as sims, Fleet.connect(urls(sims)) as fleet:
+        motions = [await fleet[name].queue.wait(600) for name in fleet]
+        stop = asyncio.create_task(fleet.stop())
+        await asyncio.sleep(0)
+        assert [sim.arm.executed[-1].outcome for sim in sims.values()] == ["aborted", "aborted"]
+        assert not any(motion.done for motion in motions)
+        await stop
+        for motion in motions:
+            with pytest.raises(MotionStopped):
+                await motion
+
+        figures = [fleet[name].link.stats for name in fleet]
+        assert not any(each.unexpected or each.repeated or each.timeouts for each in figures)
+        await fleet.each("move_to", *NEAR)
+
+
+@virtual
+async def test_a_shout_that_is_lost_costs_nothing_but_time() -> None:
+    async with cell("left", speed=1) as sims, Fleet.connect(urls(sims)) as fleet:
+        motion = await fleet["left"].queue.wait(600)
+        sims["left"].faults.loss = 1.0
+        stop = asyncio.create_task(fleet.stop())
+        await asyncio.sleep(0)
+        sims["left"].faults.loss = 0.0
+        await stop
+        with pytest.raises(MotionStopped):
+            await motion
+
+        assert sims["left"].arm.device.idle
+
+
+@virtual
+async def test_what_a_stop_makes_the_arm_tick_off_is_not_done() -> None:
+    async with cell("left", speed=1) as sims, Fleet.connect(urls(sims)) as fleet:
+        arm = fleet["left"]
+        motion = await arm.queue.wait(600)
+        with arm.queue.stopping(MotionStopped("now")):
+            await arm.request(c.SET_QUEUED_CMD_FORCE_STOP_EXEC, None)
+            await arm.queue.update()
+            assert not motion.done
+
+        await fleet.stop()
+        with pytest.raises(MotionStopped):
+            await motion
+
+
+@virtual
+async def test_an_arm_is_lost_while_another_one_is_still_being_connected() -> None:
+    async with cell("left", "right", "third") as sims:
+        sims["right"].faults.latency = sims["third"].faults.latency = 0.1
+        asyncio.get_running_loop().call_later(0.1, sims["left"].unplug)
+        async with Fleet.connect(urls(sims)) as fleet:
+            assert isinstance(fleet.failures["left"], ConnectionLost)
+            for name in ("right", "third"):
+                with pytest.raises(MotionStopped, match="left"):
+                    await fleet[name].move_to(*NEAR)
+
+
+@virtual
 async def test_an_alarm_stops_the_others_and_names_the_arm() -> None:
     async with cell("left", "right") as sims, Fleet.connect(urls(sims)) as fleet:
         right = await fleet["right"].queue.wait(600)

@@ -12,6 +12,8 @@ from virtual import virtual
 
 from dobot_async import ArmAlarm, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
 from dobot_async.fleet import BaseFrame, Box, Cylinder, Member, ZoneDeadlock, ZoneOccupied
+from dobot_async.fleet.claims import Claim, Party
+from dobot_async.fleet.zones import Zones
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
@@ -102,6 +104,198 @@ async def test_a_deadlock_of_programs_raises() -> None:
         told = await fleet.run({"left": program("bin", "belt"), "right": program("belt", "bin")})
         assert min(told.values()).startswith("a deadlock: program right waits for zone bin, which program left")
         assert "both" in told.values()
+
+
+@pytest.mark.parametrize("first", ["barrier", "zone"])
+def test_who_closes_a_deadlock_of_a_barrier_and_a_zone_is_told(first: str) -> None:
+    @virtual
+    async def scene() -> None:
+        async with facing() as (fleet, _):
+            told: list[str] = []
+
+            async def holder() -> None:
+                try:
+                    async with fleet.zone("belt"):
+                        await asyncio.sleep(1 if first == "barrier" else 3)
+                        await fleet.barrier("meet")
+                except ZoneDeadlock as error:
+                    told.append(str(error))
+                    await fleet.barrier("meet")
+
+            async def comer() -> None:
+                await asyncio.sleep(2)
+                try:
+                    async with fleet.zone("belt"):
+                        pass
+                except ZoneDeadlock as error:
+                    told.append(str(error))
+
+                await fleet.barrier("meet")
+
+            async with asyncio.timeout(60):
+                await fleet.run({"left": holder(), "right": comer()})
+
+            assert len(told) == 1
+            assert "program left waits at barrier 'meet' for program right" in told[0]
+            assert "program right waits for zone belt, which program left holds" in told[0]
+
+    scene()
+
+
+@virtual
+async def test_an_arm_that_stands_in_a_zone_at_a_barrier_where_its_partner_needs_it() -> None:
+    async with facing() as (fleet, sims):
+
+        async def left() -> None:
+            await fleet["left"].move_to(*IN)
+            await fleet.barrier("meet")
+
+        async def right() -> None:
+            await asyncio.sleep(20)
+            with pytest.raises(ZoneDeadlock, match=r"right waits for zone bin, which left holds; .*barrier 'meet'"):
+                await fleet["right"].move_to(*IN)
+
+            await fleet.barrier("meet")
+
+        await fleet.run({"left": left(), "right": right()})
+        assert moved(sims["right"]) == 0
+
+
+@virtual
+async def test_an_arm_that_still_moves_out_of_a_zone_at_a_barrier_is_no_deadlock() -> None:
+    async with facing() as (fleet, sims):
+        leaving = asyncio.Event()
+
+        async def left() -> None:
+            await fleet["left"].move_to(*IN)
+            await fleet["left"].set_speed(1)
+            await fleet["left"].queue.move_to(*BEHIND)
+            leaving.set()
+            await fleet.barrier("meet")
+
+        async def right() -> None:
+            await leaving.wait()
+            assert fleet.holders("bin") == ["left"]
+            await fleet["right"].move_to(*IN)
+            await fleet.barrier("meet")
+
+        await fleet.run({"left": left(), "right": right()})
+        assert moved(sims["right"]) == 1
+
+
+@virtual
+async def test_an_arm_that_comes_to_rest_in_a_zone_closes_the_deadlock() -> None:
+    async with facing() as (fleet, _):
+
+        async def left() -> None:
+            await fleet["left"].queue.move_to(*IN)
+            await fleet.barrier("meet")
+
+        async def right() -> None:
+            await asyncio.sleep(0.1)
+            with pytest.raises(ZoneDeadlock, match="barrier 'meet'"):
+                await fleet["right"].move_to(*IN)
+
+            await fleet.barrier("meet")
+
+        async with asyncio.timeout(60):
+            await fleet.run({"left": left(), "right": right()})
+
+
+@virtual
+async def test_two_programs_that_command_one_arm_and_a_zone_that_one_of_them_holds() -> None:
+    async with facing() as (fleet, sims):
+        told: list[str] = []
+
+        async def stranger() -> None:
+            await asyncio.sleep(1)
+            await fleet["left"].move_to(*IN)
+
+        async def left() -> None:
+            try:
+                async with fleet.zone("bin"):
+                    await asyncio.sleep(2)
+                    await fleet["left"].move_to(*OVER)
+            except ZoneDeadlock as error:
+                told.append(str(error))
+
+        stranger_running = asyncio.create_task(stranger(), name="stranger")
+        async with asyncio.timeout(60):
+            await fleet.run({"left": left()})
+            await stranger_running
+
+        assert len(told) == 1
+        assert "program left waits to command left behind stranger; left waits for zone bin, which program" in told[0]
+        assert moved(sims["left"]) == 1
+
+
+@virtual
+async def test_two_barriers_crossed_are_a_deadlock() -> None:
+    async with facing() as (fleet, _):
+        told: list[str] = []
+
+        async def program(first: str, second: str) -> None:
+            try:
+                await fleet.barrier(first)
+            except ZoneDeadlock as error:
+                told.append(str(error))
+                await fleet.barrier(second)
+                await fleet.barrier(first)
+            else:
+                await fleet.barrier(second)
+
+        await fleet.run({"left": program("one", "two"), "right": program("two", "one")})
+        assert len(told) == 1
+        assert "program right waits at barrier 'two' for program left" in told[0]
+        assert "program left waits at barrier 'one' for program right" in told[0]
+
+
+@virtual
+async def test_a_helper_that_waits_for_a_zone_keeps_nobody_from_a_barrier() -> None:
+    async with facing() as (fleet, _):
+        log: list[str] = []
+
+        async def helper() -> None:
+            async with fleet.zone("belt"):
+                log.append("helper")
+
+        async def left() -> None:
+            async with fleet.zone("belt"):
+                await asyncio.sleep(1)
+                await fleet.barrier("meet")
+                log.append("left")
+
+        async def right() -> None:
+            await asyncio.sleep(0.5)
+            helping = asyncio.create_task(helper())
+            await asyncio.sleep(1)
+            await fleet.barrier("meet")
+            await helping
+
+        await fleet.run({"left": left(), "right": right()})
+        assert log == ["left", "helper"]
+
+
+@virtual
+async def test_a_stop_ends_a_claim_that_is_not_judged_yet() -> None:
+    arms = {name: Party(name) for name in ("left", "right")}
+    zones = Zones({"belt": None}, arms)
+    caught_up = asyncio.Event()
+
+    async def catch_up() -> None:
+        await caught_up.wait()
+
+    zones.guards.append(catch_up)
+    zones.claims.take(Claim(arms["left"], frozenset([arms["left"]]), frozenset(["belt"])))
+    claim = Claim(arms["right"], frozenset([arms["right"]]), frozenset(["belt"]))
+    asking = asyncio.create_task(zones.claim(claim, None))
+    await asyncio.sleep(1)
+    zones.claims.interrupt(arms["right"], MotionStopped("enough"))
+    caught_up.set()
+    with pytest.raises(MotionStopped, match="enough"):
+        await asking
+
+    assert not zones.claims.waiting
 
 
 @virtual
