@@ -25,6 +25,8 @@ __all__ = ["Asking"]
 
 F = TypeVar("F", bound=Frame)
 LEAST_PATIENCE = 0.001  # seconds; nobody answers a request for which less is left
+OVERDUE = object()
+"""Delivered instead of a reply when its time is up."""
 
 
 class Line(Sender, Protocol):
@@ -53,7 +55,7 @@ class Asking(Generic[F]):
         pending: Who waits on it.
         round_trip: How long its answers take.
         stats: Where to count.
-        send: Sends a frame.
+        send: Sends a frame; raises TimeoutError if it cannot within so many seconds.
         resync: Gives up a frame the rest of which is overdue, and delivers what was inside of it.
         fences: Questions that harm nobody.
     """
@@ -65,7 +67,7 @@ class Asking(Generic[F]):
         round_trip: RoundTrip,
         stats: LinkStats,
         *,
-        send: Callable[[F], Awaitable[None]],
+        send: Callable[[F, float | None], Awaitable[None]],
         resync: Callable[[], None],
         fences: Sequence[F],
     ) -> None:
@@ -153,7 +155,7 @@ class Asking(Generic[F]):
             waiter.listen(partial(deliver, answered))
             self._stats.sent += 1
             waiter.sent()
-            await self._send(frame)
+            await self._send(frame, None)
             if self._link.disorder:  # on a stream nothing overtakes it
                 async with asyncio.timeout(self._round_trip.timeout):
                     await answered
@@ -177,25 +179,28 @@ class Asking(Generic[F]):
 
     async def _ask(self, frame: F, waiter: Waiter[F], reply: asyncio.Future[Any], patience: float) -> bool:
         """Sends a frame, unless its answer is there already; returns whether there is one in time."""
-        with suppress(TimeoutError):
-            async with asyncio.timeout(patience):
-                if not reply.done():
-                    self._stats.sent += 1
-                    self._stats.repeated += bool(waiter.sends)
-                    waiter.sent()
-                    await self._send(frame)
-                    await self._prove(waiter, reply)
-
+        if not reply.done():
+            self._stats.sent += 1
+            self._stats.repeated += bool(waiter.sends)
+            waiter.sent()
+            expiry = self._loop.call_later(patience, deliver, reply, OVERDUE)
+            try:
+                await self._send(frame, patience)
+                await self._prove(waiter, reply, patience)
                 await reply
+            except TimeoutError:
+                deliver(reply, OVERDUE)
+            finally:
+                expiry.cancel()
 
         waiter.give_up()
-        if reply.done() and not reply.cancelled():
+        if reply.result() is not OVERDUE:
             return True
 
         self._link.overdue()
         return False
 
-    async def _prove(self, waiter: Waiter[F], reply: asyncio.Future[Any]) -> None:
+    async def _prove(self, waiter: Waiter[F], reply: asyncio.Future[Any], patience: float) -> None:
         """Where an answer may be late alone, asks something else behind the question, and waits for both answers.
 
         If there is one answer to the question by then, it is the right one: replies come in order.
@@ -212,7 +217,7 @@ class Asking(Generic[F]):
             witness.listen(waiter.prove)
             self._stats.sent += 1
             witness.sent()
-            await self._send(frame)
+            await self._send(frame, patience)
             await reply
 
     def _other(self, key: Hashable) -> F | None:

@@ -277,8 +277,7 @@ class Link(Generic[F]):
         try:
             waiter.sent()
             self._stats.sent += 1
-            async with asyncio.timeout(timeout):
-                await self._send(frame)
+            await self._send(frame, timeout)
         except BaseException as error:
             posted.forget()
             if isinstance(error, TimeoutError):
@@ -361,8 +360,8 @@ class Link(Generic[F]):
             self._turns.give(key)
             self._check()
 
-    async def _send(self, frame: F) -> None:
-        """Hands one whole frame to the transport."""
+    async def _send(self, frame: F, patience: float | None) -> None:
+        """Hands one whole frame to the transport; raises TimeoutError if it does not take it in so many seconds."""
         if self.trace:
             self.trace(True, frame)
 
@@ -371,15 +370,18 @@ class Link(Generic[F]):
             self._unanswered = 0
             data = self._filler + data
 
-        try:
-            async with self._sending:
-                await self._transport.send(data)
-        except BROKEN as error:
-            if self._reopen:
-                return  # as if it had been lost on the way: the reader finds the break, and mends it
+        if not self._sending.locked() and self._write(data):
+            return
 
-            self._end(LinkState.LOST, error.__cause__ or error)
-            raise self._lost() from error
+        async with asyncio.timeout(patience), self._sending:
+            try:
+                await self._transport.send(data)
+            except BROKEN as error:
+                if self._reopen:
+                    return  # as if it had been lost on the way: the reader finds the break, and mends it
+
+                self._end(LinkState.LOST, error.__cause__ or error)
+                raise self._lost() from error
 
     async def _read(self) -> None:
         """Reads until the transport ends, and from the next one if it may be reopened."""

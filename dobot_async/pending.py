@@ -118,7 +118,7 @@ class Pending(Generic[F]):
     def resolve(self, frame: F) -> bool:
         """Gives a frame to the first in its line whom it fits; False if nobody waits for it."""
         now = self.clock()
-        doubled = now < self.calm_at(frame.key)
+        doubled = self._disorder() > 0 and now < self.calm_at(frame.key)
         line = self.line(frame.key)
         found = self._find(line, frame, now, doubled=doubled)
         if found or not doubled:
@@ -174,6 +174,9 @@ class Pending(Generic[F]):
         line = self._lines.get(key)
         if line is None:
             return []
+
+        if len(line) == 1 and line[0].waiter.deliver:
+            return line  # as it nearly always is
 
         if any(not sent.waiter.deliver for sent in line):
             now = self.clock()
