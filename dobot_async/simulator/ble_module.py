@@ -15,6 +15,7 @@ from functools import partial
 
 from dbus_fast import Message
 
+from dobot_async.simulator.ble_connection import CONNECT, SUBSCRIBE, WRITE, Connection
 from dobot_async.simulator.ble_names import (
     CHARACTERISTIC,
     DEVICE,
@@ -27,8 +28,8 @@ from dobot_async.simulator.ble_names import (
     device,
     services,
 )
-from dobot_async.simulator.endpoints import Client, Simulation
-from dobot_async.simulator.radio import Air, Line, Radio
+from dobot_async.simulator.endpoints import Simulation
+from dobot_async.simulator.radio import Radio
 
 __all__ = ["Module"]
 
@@ -82,12 +83,7 @@ class Module:
         self._simulation = simulation
         self._loop = asyncio.get_running_loop()
         self._bluez: Service | None = None
-        self._air: Air | None = None
-        self._line: Line | None = None
-        self._connected = False
-        self._connecting: Message | None = None
-        self._writing: Message | None = None
-        self._subscribing: Message | None = None
+        self._connection: Connection | None = None
         self._listeners: set[str] = set()
         self._heard = 0
         self._timers: set[asyncio.TimerHandle] = set()
@@ -96,7 +92,7 @@ class Module:
     @property
     def connected(self) -> bool:
         """Whether BlueZ is connected to it."""
-        return self._connected
+        return bool(self._connection and self._connection.line)
 
     @property
     def resolved(self) -> bool:
@@ -124,7 +120,7 @@ class Module:
     def lose(self) -> None:
         """The connection breaks, as it does when somebody walks away with the phone."""
         bluez = self._bluez
-        if bluez and (self._air or self._connecting):
+        if bluez and self._connection:
             calls = self._break()
             bluez.objects.change(self.path, DEVICE, Connected=False, ServicesResolved=False)
             for call, text in calls:
@@ -147,9 +143,9 @@ class Module:
     def say(self, data: bytes) -> None:
         """Notifies of bytes as if the arm had said them."""
         size = self.radio.payload
-        if self._air:
+        if self._connection:
             for at in range(0, len(data), size):
-                self._air.back(partial(self._notify, data[at : at + size]))
+                self._connection.air.back(partial(self._notify, data[at : at + size]))
 
     def change_mtu(self, mtu: int) -> None:
         """Both sides agree on another length of packets."""
@@ -161,30 +157,29 @@ class Module:
     def connect(self, call: Message) -> None:
         """Device1.Connect."""
         assert self._bluez
-        if self._connected:
+        if self.connected:
             self._bluez.answer(call)
-        elif self._connecting:
+        elif self._connection:
             raise Refused("org.bluez.Error.InProgress", "In Progress")
         else:
-            self._connecting = call
+            connection = self._connection = Connection(self.radio)
+            connection.wait(CONNECT, call)
             self.watch("connect")
-            if self._connecting is call and self.in_range and not self.taken:
-                self._air = Air(self.radio)
-                self._in_events(CONNECTING, self._up)
-            elif self._connecting is call:
-                self._later(NOBODY, lambda: self.lose() if self._connecting is call else None)
+            if self._connection is connection and self.in_range and not self.taken:
+                connection.in_events(CONNECTING, self._up)
+            elif self._connection is connection:
+                connection.later(NOBODY, self.lose)
 
     def disconnect(self, call: Message) -> None:
         """Device1.Disconnect."""
         assert self._bluez
         bluez = self._bluez
-        if not self._air and not self._connecting:
+        connection = self._connection
+        if not connection:
             raise Refused("org.bluez.Error.NotConnected", "Not Connected")
 
-        air = self._air
-
         def done() -> None:
-            if self._air is air:
+            if self._connection is connection:
                 self.lose()
 
             bluez.answer(call)
@@ -199,11 +194,10 @@ class Module:
         data, options = call.body
         kind = options["type"].value
         flag = {"command": "write-without-response", "request": "write"}[kind]
-        if self._writing:
+        if self._connection and self._connection.waits(WRITE):
             raise Refused("org.bluez.Error.InProgress", "In Progress")
 
-        self._check("write")
-        assert self._air
+        connection = self._ready("write")
         assert self._bluez
         if flag not in self.writes or not (call.path or "").endswith(WRITES_PATH):
             raise Refused("org.bluez.Error.NotSupported", "Operation is not supported")
@@ -213,23 +207,22 @@ class Module:
 
         self.written.append(bytes(data))
         self.kinds.append(kind)
-        if self.stuck:
-            self._writing = call
-        elif kind == "command":
-            self._air.there(lambda: self._arrive(data))
-            self._bluez.answer(call)
+        if kind == "request" or self.stuck:
+            connection.wait(WRITE, call)
         else:
-            self._writing = call
-            self._air.there(lambda: self._arrive(data, confirm=True))
+            self._bluez.answer(call)
+
+        if not self.stuck:
+            connection.air.there(lambda: self._arrive(data, confirm=kind == "request"))
 
     def start_notify(self, call: Message) -> None:
         """GattCharacteristic1.StartNotify."""
-        self._check("start_notify")
-        if call.sender in self._listeners or self._subscribing:
+        connection = self._ready("start_notify")
+        if call.sender in self._listeners or connection.waits(SUBSCRIBE):
             raise Refused("org.bluez.Error.InProgress", "In Progress")
 
-        self._subscribing = call
-        self._in_events(SUBSCRIBING, self._subscribed)
+        connection.wait(SUBSCRIBE, call)
+        connection.in_events(SUBSCRIBING, partial(self._subscribed, call.sender or ""))
 
     def stop_notify(self, client: str) -> None:
         """A client wants no notifications any more, or has left the bus."""
@@ -238,16 +231,18 @@ class Module:
             if self._bluez and not self._listeners:
                 self._bluez.objects.change(f"{self.path}/{NOTIFIES_PATH}", CHARACTERISTIC, Notifying=False)
 
-    def _check(self, step: str) -> None:
-        """Announces a step; it can be taken only while the connection lasts."""
+    def _ready(self, step: str) -> Connection:
+        """Announces a step, and returns the connection, without which it cannot be taken."""
         self.watch(step)
-        if not self._connected:
+        if not self._connection or not self._connection.line:
             raise Refused(FAILED, "Not connected")
+
+        return self._connection
 
     def _advertise(self) -> None:
         bluez = self._bluez
         self._advertising = False
-        if not bluez or not bluez.scanning or self._air or self._connecting:
+        if not bluez or not bluez.scanning or self._connection:
             return
 
         if self.in_range and not self.taken:
@@ -266,35 +261,20 @@ class Module:
     def _up(self) -> None:
         """The connection is there; its services are not known yet."""
         self.watch("connected")
-        if not self._air or not self._bluez or not self._connecting:
+        connection = self._connection
+        if not connection or not self._bluez:
             return
 
-        call, self._connecting = self._connecting, None
-        self._connected = True
+        connection.plug_in(self._simulation, self.say, self.lose)
         self.connections += 1
-        self._line = self._plugged_in()
         self._bluez.objects.change(self.path, DEVICE, Connected=True)
-        self._bluez.answer(call)
-        self._in_events(RESOLVING, self._resolved)
-
-    def _plugged_in(self) -> Line:
-        """Makes the line to the arm; the arm may have itself unplugged."""
-
-        def deliver(data: bytes) -> None:
-            client.send(data)
-
-        def unplugged() -> None:
-            line.cut()
-            self.lose()
-
-        line = Line(deliver, self.say, lambda: self._simulation.leave(client))
-        client: Client = self._simulation.client(line.answer, unplugged, ordered=True)
-        return line
+        self._answer(CONNECT)
+        connection.in_events(RESOLVING, self._resolved)
 
     def _resolved(self) -> None:
         """The services are known."""
         self.watch("resolved")
-        if not self._connected or not self._bluez:
+        if not self.connected or not self._bluez:
             return
 
         objects = self._bluez.objects
@@ -305,55 +285,35 @@ class Module:
         self.change_mtu(self.radio.mtu)
         objects.change(self.path, DEVICE, ServicesResolved=True, UUIDs=[SERVICE_UUID] if self.services else [])
 
-    def _subscribed(self) -> None:
-        if self._subscribing and self._bluez:
-            call, self._subscribing = self._subscribing, None
-            self._listeners.add(call.sender or "")
+    def _subscribed(self, client: str) -> None:
+        if self._bluez:
+            self._listeners.add(client)
             self._bluez.objects.change(f"{self.path}/{NOTIFIES_PATH}", CHARACTERISTIC, Notifying=True)
-            self._bluez.answer(call)
+            self._answer(SUBSCRIBE)
 
     def _arrive(self, data: bytes, *, confirm: bool = False) -> None:
         """A chunk reaches the module, which hands it on; a write that wants it is confirmed."""
         self.watch("arrive")
-        if self._line and self._air:
-            self._line.send(data)
+        if self._connection and self._connection.line:
+            self._connection.line.send(data)
             if confirm:
-                self._air.back(self._confirmed)
-
-    def _confirmed(self) -> None:
-        if self._writing and self._bluez:
-            call, self._writing = self._writing, None
-            self._bluez.answer(call)
+                self._connection.air.back(partial(self._answer, WRITE))
 
     def _notify(self, chunk: bytes) -> None:
         self.watch("notify")
-        if self._connected and self._bluez and self._listeners:
+        if self.connected and self._bluez and self._listeners:
             self._bluez.objects.change(f"{self.path}/{NOTIFIES_PATH}", CHARACTERISTIC, Value=chunk)
 
     def _break(self) -> list[tuple[Message, str]]:
         """Ends the connection; returns the calls that fail by that, with what BlueZ says."""
-        failing = [
-            (self._connecting, "le-connection-abort-by-local"),
-            (self._writing, "Operation failed with ATT error: 0x0e"),
-            (self._subscribing, "Not connected"),
-        ]
-        self._connecting = self._writing = self._subscribing = None
-        self._connected = False
-        air, self._air = self._air, None
-        line, self._line = self._line, None
-        if air:
-            air.close()
+        connection, self._connection = self._connection, None
+        return connection.end() if connection else []
 
-        if line:
-            line.end()
-
-        return [(call, text) for call, text in failing if call]
-
-    def _in_events(self, events: int, then: Callable[[], None]) -> None:
-        """Does something after some connection events, if the connection lasts."""
-        air = self._air
-        assert air
-        self._keep(air.after(events, lambda: then() if self._air is air else None))
+    def _answer(self, what: str) -> None:
+        """Answers the call of a kind that waits."""
+        call = self._connection and self._connection.waited(what)
+        if call and self._bluez:
+            self._bluez.answer(call)
 
     def _later(self, seconds: float, then: Callable[[], None]) -> None:
         self._keep(self._loop.call_later(seconds, then))

@@ -21,7 +21,7 @@ from dobot_async.simulator.endpoints import Simulation
 from dobot_async.simulator.radio import Radio
 from dobot_async.simulator.system_bus import ADDRESS, PatientBus, dbus_daemon
 
-__all__ = ["Rig", "rig", "serve"]
+__all__ = ["Rig", "forget_bus", "rig", "serve"]
 
 FIRST_ADDRESS = 0xD8B04CB33868  # in the range of the module's maker
 

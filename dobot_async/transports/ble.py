@@ -3,9 +3,9 @@
     send    --> chunks of MTU - 3 bytes --> writes on 0003CDD2, one at a time --> module --> arm
     receive <-- notifications on 0003CDD1, cut anywhere                       <-- module <--
 
-A chunk goes out `PACE` seconds after the one before it, as the vendor's apps do it: neither the system nor the module
-says when it has room for the next one. The answer of the arm does, so a new frame need not wait after one. For the same
-reason one request is unanswered at a time.
+A chunk goes out `PACE` seconds after the one before it went out, and not before the system has taken that, as the
+vendor's apps do it: neither the system nor the module says when it has room for the next one. The answer of the arm
+does, so a new frame need not wait after one. For the same reason one request is unanswered at a time.
 
 A frame that has begun is sent to its end, whatever becomes of the caller: half of one would spoil the next. Every call
 of bleak's races against the end of the connection and a deadline, for some of them never return when the peer is gone.
@@ -89,7 +89,8 @@ class Opening:
 
     async def transport(self) -> BleTransport:
         """Returns a connection, or raises ConnectFailed."""
-        for pause in (*PAUSES, math.inf):
+        pauses = iter(PAUSES)
+        while True:
             try:
                 return await self._connected(await self._found())
             except ConnectFailed:
@@ -97,12 +98,14 @@ class Opening:
             except Exception as error:  # what bleak raises is whatever the operating system says
                 problem = trouble(error)
                 self.trouble = problem.text
-                if not problem.passing or pause == math.inf:
+                pause = next(pauses, None)
+                if not problem.passing or pause is None:
                     raise ConnectFailed(f"cannot open {self._url}: {problem.text}") from error
+            except BaseException:
+                self._claim.drop()  # the arm may have been found just now, and not be connected to yet
+                raise
 
             await asyncio.sleep(pause)
-
-        raise AssertionError
 
     async def _found(self) -> Seen:
         """Returns the arm: one that is connected already, or the first one that is seen."""
@@ -148,7 +151,8 @@ class Opening:
 
         who = f"{self._wanted.text} was not seen" if self._wanted.text else "no arm was seen"
         names = ", ".join(list(others.values())[:NAMED])
-        instead = f"only {len(others)} other BLE devices, such as {names}" if others else "nor any other BLE device"
+        count = f"{len(others)} other BLE device{'s' if len(others) > 1 else ''}"
+        instead = f"only {count}, such as {names}" if others else "nor any other BLE device"
         return f"{who}, {instead}; {NOT_FOUND}"
 
     async def _connected(self, seen: Seen) -> BleTransport:
@@ -196,7 +200,8 @@ class BleTransport:
         self._turn = anyio.Lock()
         self._frame: asyncio.Task[None] | None = None
         self._closing: asyncio.Task[None] | None = None
-        self._last = self._due = 0.0
+        self._handed_over = -math.inf
+        self._answered = False
         self._buffer = bytearray()
         self._arrived: asyncio.Future[None] | None = None
 
@@ -247,18 +252,23 @@ class BleTransport:
 
     async def _write(self, data: bytes) -> None:
         """Writes a frame to its end, or until the connection ends; tells of errors by `_lose`."""
-        first = True
+        due = -math.inf if self._answered else self._handed_over + self._pace
         while data and not self._lost.done():
-            await self._until(self._due if first else self._last + self._pace)
-            size = max(1, min(self._output.max_write_without_response_size, LARGEST))  # it may change at any time
-            chunk, data, first = data[:size], data[size:], False
+            await self._until(due)
             try:
-                await self._call(self._client.write_gatt_char(self._output, chunk, response=self._response), GATT)
+                size = max(1, min(self._output.max_write_without_response_size, LARGEST))  # it may change at any time
+                chunk, data = data[:size], data[size:]
+                await self._call(self._hand_over(chunk), GATT)
             except Exception as error:  # noqa: BLE001 - whatever it is, nobody knows what of the frame has arrived
                 self._lose(error)
 
-            self._last = self._loop.time()
-            self._due = self._last + self._pace
+            due = self._handed_over + self._pace
+
+    async def _hand_over(self, chunk: bytes) -> None:
+        """Writes a chunk; returns when the system has taken it, or, with a response, the module."""
+        self._handed_over = self._loop.time()
+        self._answered = False
+        await self._client.write_gatt_char(self._output, chunk, response=self._response)
 
     async def _until(self, due: float) -> None:
         """Waits for a time, or for the end of the connection."""
@@ -288,7 +298,7 @@ class BleTransport:
 
     def _receive(self, _: Any, data: bytearray) -> None:
         """Keeps what arrives; if nobody takes it, the rest is lost, as a UART's is."""
-        self._due = 0.0
+        self._answered = True
         if len(self._buffer) < BUFFER:
             self._buffer += data
             self._wake()

@@ -18,7 +18,12 @@ from bleak.exc import (
 )
 from bleak.exc import BleakBluetoothNotAvailableReason as Reason
 
-__all__ = ["NOT_FOUND", "Trouble", "trouble"]
+__all__ = ["NEAR", "NOT_FOUND", "ServiceHangs", "Trouble", "trouble"]
+
+
+class ServiceHangs(Exception):
+    """The computer's own Bluetooth service is there, and does not answer."""
+
 
 OFF = "Bluetooth is off; switch it on (Linux: rfkill unblock bluetooth, then bluetoothctl power on)"
 DENIED = (
@@ -26,6 +31,7 @@ DENIED = (
     "Settings, Privacy, Radios; Linux: add this user to the group bluetooth, then log in again)"
 )
 NO_DAEMON = "the Bluetooth service does not answer; start it (Linux: install bluez, then systemctl start bluetooth)"
+HANGS = "restart it (Linux: systemctl restart bluetooth; macOS: it may wait for a permission that it asks for)"
 NO_BUS = "there is no D-Bus system bus, which bleak needs on Linux; in a container, share /run/dbus with it"
 NO_ADAPTER = "this computer has no such Bluetooth adapter; is it plugged in, and is its name right (adapter=hci0)?"
 OLD = "update bluez; it is older than bleak can use"
@@ -36,6 +42,7 @@ NOT_FOUND = (
     "is the arm switched on and near, is its BLE module plugged in, and is no phone, other computer or other program "
     "connected to it? It serves one at a time, and cannot be seen while it does"
 )
+
 
 REASONS = {
     Reason.NO_BLUETOOTH: NO_ADAPTER,
@@ -64,6 +71,7 @@ KINDS: tuple[tuple[type[BaseException], Callable[[Any], str | None]], ...] = (
     (BleakDBusError, lambda error: DBUS_ERRORS.get(error.dbus_error)),
     (BleakCharacteristicNotFoundError, lambda _: NO_MODULE),
     (BleakError, lambda error: next((TEXTS[text] for text in TEXTS if str(error).startswith(text)), None)),
+    (ServiceHangs, lambda _: HANGS),
     (PermissionError, lambda _: DENIED),
     (FileNotFoundError, lambda _: NO_BUS),
     (ConnectionRefusedError, lambda _: NO_BUS),

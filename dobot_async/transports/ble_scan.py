@@ -9,10 +9,10 @@ from __future__ import annotations
 import asyncio
 import re
 import sys
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import bleak
@@ -21,7 +21,8 @@ from bleak.args.bluez import BlueZScannerArgs
 from bleak.backends.device import BLEDevice
 from bleak.backends.scanner import AdvertisementData
 
-from dobot_async.transports.tasks import whole
+from dobot_async.transports.ble_advice import ServiceHangs
+from dobot_async.transports.tasks import whole, within
 
 __all__ = ["INPUT", "OUTPUT", "SERVICE", "Seen", "Wanted", "connected", "listening"]
 
@@ -30,6 +31,10 @@ INPUT = "0003cdd1-0000-1000-8000-00805f9b0131"
 OUTPUT = "0003cdd2-0000-1000-8000-00805f9b0131"
 MODULES = ("usr-ble100", "wh-ble 102", "wh-ble102")
 """What the names of the arm's BLE modules contain; few advertise their service as well."""
+
+T = TypeVar("T")
+PATIENCE = 5.0
+"""Seconds in which the computer's own Bluetooth service answers, if it ever does; bleak would wait for ever."""
 
 ADDRESS = re.compile(r"[0-9a-f]{2}([:_-][0-9a-f]{2}){5}|[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.IGNORECASE)
 """Of the radio; of this computer's own making on macOS."""
@@ -95,7 +100,7 @@ class Scan:
                 scanner = BleakScanner(
                     self._tell, bluez=BlueZScannerArgs(adapter=self._adapter) if self._adapter else BlueZScannerArgs()
                 )
-                await scanner.start()
+                await answered(scanner.start())
                 self._scanner = scanner
 
             for device, advertisement in self._scanner.discovered_devices_and_advertisement_data.values():
@@ -111,7 +116,7 @@ class Scan:
             if scanner and not self._listeners:
                 self._scanner = None
                 with suppress(Exception):  # an adapter that was switched off, or a service that died, scans no more
-                    await scanner.stop()
+                    await answered(scanner.stop())
 
     def _tell(self, device: BLEDevice, advertisement: AdvertisementData) -> None:
         for listener in list(self._listeners):
@@ -159,7 +164,15 @@ async def connected(adapter: str | None = None) -> tuple[list[Seen], list[Seen]]
 
     A program that crashed leaves its connection behind on Linux, and such an arm is found by no scan. One that
     another program listens to must be left alone: to close a connection to it would close that program's as well.
+
+    Raises:
+        Exception: What bleak says; `trouble` tells what it means.
     """
+    return await answered(connections(adapter))
+
+
+async def connections(adapter: str | None) -> tuple[list[Seen], list[Seen]]:
+    """The same, as long as it takes."""
     adapters: Any = getattr(bleak, "BleakAdapter", None)  # bleak has it from 3.1 on
     if adapters is None:
         return [], []
@@ -171,9 +184,20 @@ async def connected(adapter: str | None = None) -> tuple[list[Seen], list[Seen]]
         return [], []
 
     found = [Seen(device, device.name or "", frozenset({SERVICE}), connected=True) for device in devices]
-    used = await listened_to() if found and sys.platform == "linux" else set()
-    taken = [seen for seen in found if seen.device.details["path"] in used] if used else []
+    if not found or sys.platform != "linux":
+        return found, []
+
+    used = await listened_to()
+    taken = [seen for seen in found if seen.device.details["path"] in used]
     return [seen for seen in found if seen not in taken], taken
+
+
+async def answered(work: Coroutine[Any, Any, T]) -> T:
+    """Awaits what the Bluetooth service does at once, unless it hangs."""
+    try:
+        return await within(PATIENCE, work)
+    except TimeoutError:
+        raise ServiceHangs("the computer's Bluetooth service does not answer") from None
 
 
 async def listened_to() -> set[str]:

@@ -11,7 +11,7 @@ import re
 import socket
 import struct
 import threading
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from random import Random
@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 from virtual import run_virtual, virtual
 
 from dobot_async import ConnectFailed, Magician
-from dobot_async.simulator import Faults, Simulation, simulate
+from dobot_async.simulator import Faults, Simulation, endpoints, simulate
 from dobot_async.simulator.faults import Channel
 from dobot_async.transports import Transport, open_transport
 
@@ -89,10 +89,25 @@ async def is_hung_up(transport: Transport) -> bool:
     return True
 
 
-async def ticks() -> None:
-    """Long enough for what is on its way through the loop and the kernel."""
-    for _ in range(20):
-        await asyncio.sleep(0.001)
+async def until(condition: Callable[[], object]) -> None:
+    """Lets the loop go on until something has come about."""
+    async with asyncio.timeout(IN_TIME):
+        while not condition():  # noqa: ASYNC110 - nobody tells when
+            await asyncio.sleep(0.001)
+
+
+@pytest.fixture
+def heard(monkeypatch: pytest.MonkeyPatch) -> bytearray:
+    """All that reaches simulated arms, before the faults of their lines."""
+    arrived = bytearray()
+    send = endpoints.Client.send
+
+    def noted(client: endpoints.Client, data: bytes) -> None:
+        arrived.extend(data)
+        send(client, data)
+
+    monkeypatch.setattr(endpoints.Client, "send", noted)
+    return arrived
 
 
 # Every place.
@@ -202,23 +217,26 @@ async def test_a_client_that_vanishes_in_mid_frame(listen: str, cut: int) -> Non
         assert sim.arm.device.accepted == 0
 
 
-async def test_a_tcp_client_that_vanishes_without_a_word() -> None:
+async def test_a_tcp_client_that_vanishes_without_a_word(heard: bytearray) -> None:
     async with simulate(listen="tcp://127.0.0.1:0") as sim:
         loop = asyncio.get_running_loop()
         with connected(sim) as peer:
             await loop.sock_sendall(peer, PTP[:9])
-            await ticks()
+            await until(lambda: heard == PTP[:9])
             peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # close by a reset
 
         async with client(sim.url) as transport:
             assert await ask(transport) == NAME_REPLY
 
 
-async def test_a_serial_line_forgets_half_a_frame_after_a_silence() -> None:
-    """A port does not show who has opened it; after a second of silence it counts as somebody else."""
+async def test_a_serial_line_forgets_half_a_frame_after_a_silence(
+    heard: bytearray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A port does not show who has opened it; after a second of silence, here any, it counts as somebody else."""
     async with simulate(listen="pty") as sim, client(sim.url) as transport:
-        await transport.send(PTP[:-1])
-        await asyncio.sleep(1.1)
+        await transport.send(PTP[:9])
+        await until(lambda: heard == PTP[:9])
+        monkeypatch.setattr(endpoints, "SILENCE", 0.0)
         assert await ask(transport) == NAME_REPLY
 
 
@@ -237,13 +255,13 @@ async def test_unplug_breaks_the_line_of_every_client(listen: str) -> None:
 
 
 @pytest.mark.parametrize("listen", SHARED)
-async def test_after_unplug_clients_may_come_again(listen: str) -> None:
+async def test_after_unplug_clients_may_come_again(listen: str, heard: bytearray) -> None:
     async with simulate(listen=listen) as sim:
         for _ in range(3):
             async with client(sim.url) as transport:
                 assert await ask(transport) == NAME_REPLY
                 await transport.send(GET_NAME[:3])
-                await ticks()
+                await until(lambda: heard.endswith(GET_NAME[:3]))
                 sim.unplug()
 
 
@@ -254,24 +272,21 @@ async def test_an_unplugged_port_is_gone() -> None:
             await open_transport(sim.url, arm="magician")
 
 
-async def test_unplug_forgets_half_a_datagram_stream_and_what_is_on_the_way() -> None:
+async def test_unplug_forgets_half_a_datagram_stream_and_what_is_on_the_way(heard: bytearray) -> None:
     """Nobody hangs up on UDP: what is under way is lost, and the next datagram is somebody new."""
     async with simulate(listen="udp://127.0.0.1:0") as sim, client(sim.url) as transport:
-        await transport.send(PTP[:-1])
-        await ticks()
-        sim.faults.latency = 0.05
+        await transport.send(PTP[:9])
+        await until(lambda: heard == PTP[:9])
+        sim.faults.latency = 0.02
         await transport.send(GET_NAME)
-        await ticks()
+        await until(lambda: heard == PTP[:9] + GET_NAME)
         sim.unplug()
-        sim.faults.latency = 0.0
-        assert await ask(transport) == NAME_REPLY
-        await asyncio.sleep(0.15)
-        await transport.send(GET_POSE)
-        assert (await receive(transport, POSE_REPLY))[3] == GET_POSE[3]
+        sim.faults.latency = 0.04  # the answer to what was under way would come before the next one
+        assert (await ask(transport, GET_POSE, POSE_REPLY))[3] == GET_POSE[3]
 
 
 @everywhere
-async def test_nothing_is_left(listen: str) -> None:
+async def test_nothing_is_left(listen: str, heard: bytearray) -> None:
     """Neither by a simulation that nobody used, nor with clients and messages on the way."""
     gc.collect()
     before = left_behind()
@@ -283,14 +298,13 @@ async def test_nothing_is_left(listen: str) -> None:
         for _ in range(3):
             await transport.send(GET_NAME)
 
-        await ticks()
+        await until(lambda: heard == 3 * GET_NAME)
 
     with suppress(anyio.BrokenResourceError):
         await transport.send(GET_NAME)
 
     await transport.aclose()
-    await ticks()
-    assert left_behind() == before
+    await until(lambda: left_behind() == before)
 
 
 @everywhere
@@ -300,8 +314,7 @@ async def test_nothing_is_left_by_an_error(listen: str) -> None:
         async with simulate(listen=listen):
             raise RuntimeError("mine")
 
-    await ticks()
-    assert left_behind() == before
+    await until(lambda: left_behind() == before)
 
 
 async def test_an_address_that_is_taken_leaves_nothing() -> None:
@@ -381,11 +394,10 @@ async def test_a_tcp_client_that_does_not_read_waits_with_its_requests() -> None
 
 async def test_a_serial_client_that_does_not_read_loses_replies_and_nobody_waits() -> None:
     async with simulate(listen="pty") as sim, client(sim.url) as transport:
-        for _ in range(20):
+        for number in range(1, 21):
             await transport.send(GET_NAME * 500)
-            await ticks()
+            await until(lambda: sim.arm.counters.requests == 500 * number)  # noqa: B023 - it is done in this round
 
-        assert sim.arm.counters.requests == 10_000
         heard = b""
         with anyio.move_on_after(0.3):
             while True:

@@ -10,8 +10,10 @@ import itertools
 import json
 import math
 import os
+import selectors
 import shutil
 import sys
+import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager, suppress
 from pathlib import Path
@@ -22,6 +24,7 @@ import anyio
 import pytest
 
 from dobot_async import ConnectFailed, ConnectionLost, Magician, MotionUnknown, PTPMode, SuctionCup
+from dobot_async.contract import LinkState
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import Frame, Parser, encode
 from dobot_async.simulator import Simulation, simulate
@@ -30,7 +33,9 @@ from dobot_async.transports import Transport, open_transport
 if sys.platform != "linux":
     pytest.skip("BlueZ is Linux's", allow_module_level=True)
 
+from bleak import BleakClient
 from bleak.backends.bluezdbus.version import BlueZFeatures
+from bleak.backends.characteristic import BleakGATTCharacteristic
 from bleak.backends.device import BLEDevice
 from bleak.exc import (
     BleakBluetoothNotAvailableError,
@@ -43,7 +48,9 @@ from bleak.exc import (
 from dbus_fast import Message
 from dbus_fast.aio import MessageBus
 
+from dobot_async.simulator import bluez
 from dobot_async.simulator.ble_module import Module
+from dobot_async.simulator.ble_names import ADAPTER
 from dobot_async.simulator.ble_rig import Rig, rig
 from dobot_async.simulator.radio import Radio, round_trip
 from dobot_async.transports import ble, ble_advice, ble_claim, ble_scan
@@ -56,6 +63,15 @@ if not DAEMON and not os.environ.get("DOBOT_REQUIRE_DBUS"):
 FAST = 0.0075
 IN_TIME = 20.0
 GET_POSE = encode(Frame(c.GET_POSE.id, 0, b""))
+SLOW = 4
+RESOLUTION = 1e-6
+PARAMS = encode(
+    Frame(
+        c.SET_PTP_JOINT_PARAMS.id,
+        1,
+        c.SET_PTP_JOINT_PARAMS.request.encode(c.PTPJointParams((200.0,) * 4, (200.0,) * 4)),
+    )
+)
 MOVE = encode(Frame(c.SET_PTP_CMD.id, 3, c.SET_PTP_CMD.request.encode(c.PTPCmd(PTPMode.MOVJ_XYZ, 220, 0, 40))))
 
 
@@ -134,6 +150,21 @@ def once(step: str, then: Callable[[], object], after: int = 0) -> Callable[[str
                 then()
 
     return watch
+
+
+def writes_are_timed(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
+    """Returns where begin and end of each write from now on will be found."""
+    times: list[tuple[float, float]] = []
+    write = BleakClient.write_gatt_char
+
+    async def timed(client: Any, *args: Any, **options: Any) -> None:
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        await write(client, *args, **options)
+        times.append((began, loop.time()))
+
+    monkeypatch.setattr(BleakClient, "write_gatt_char", timed)
+    return times
 
 
 def descriptors() -> int:
@@ -248,7 +279,7 @@ async def test_nobody_in_range(world: Rig) -> None:
 @pytest.mark.usefixtures("impatient")
 async def test_others_in_range_are_named(world: Rig, module: Module) -> None:
     module.name = "headphones"
-    with pytest.raises(ConnectFailed, match=r"bench 3 was not seen, only 1 other BLE devices, such as headphones"):
+    with pytest.raises(ConnectFailed, match=r"bench 3 was not seen, only 1 other BLE device, such as headphones"):
         await open_transport("ble://bench 3", arm="magician")
 
 
@@ -417,16 +448,35 @@ async def test_every_interval(world: Rig, sim: Simulation, interval: float, mtu:
 
 
 @pytest.mark.parametrize("pace", [0.0, 0.01, 0.02])
-async def test_chunks_keep_their_distance(module: Module, pace: float) -> None:
-    times: list[float] = []
-    loop = asyncio.get_running_loop()
-    module.watch = lambda step: times.append(loop.time()) if step == "write" else None
+async def test_chunks_keep_their_distance(module: Module, pace: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    times = writes_are_timed(monkeypatch)
     async with opened(f"{module.url}?pace={pace}") as transport:
         for _ in range(3):
             await transport.send(MOVE)  # no answer is waited for, so the frames keep the distance, too
 
         assert len(times) == 6
-        assert min(later - earlier for earlier, later in itertools.pairwise(times)) >= pace
+        assert min(then - began for (began, _), (then, _) in itertools.pairwise(times)) >= pace - RESOLUTION
+
+
+async def test_the_distance_is_kept_while_the_module_confirms(module: Module, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine that is busy is late with the next chunk, but not each time."""
+    times = writes_are_timed(monkeypatch)
+    module.writes = ["write"]
+    module.radio.interval = 0.06
+    async with opened(f"{module.url}?pace=0.02") as transport:
+        while not any(
+            then - confirmed < 0.01 for (_, confirmed), (then, _) in zip(times[::2], times[1::2], strict=True)
+        ):
+            await transport.send(MOVE)
+
+        assert all(then >= confirmed for (_, confirmed), (then, _) in itertools.pairwise(times))
+
+
+async def test_an_answer_says_that_there_is_room(module: Module, monkeypatch: pytest.MonkeyPatch) -> None:
+    times = writes_are_timed(monkeypatch)
+    async with opened(f"{module.url}?pace=1") as transport:
+        while not any(then - began < 0.9 for (began, _), (then, _) in itertools.pairwise(times)):
+            await ask(transport)
 
 
 async def test_frames_that_are_sent_at_once_do_not_mix(module: Module, sim: Simulation) -> None:
@@ -580,6 +630,18 @@ async def test_a_write_that_never_comes_back_ends_the_connection(
         await broken(transport.receive(), "did not answer in time")
 
 
+async def test_a_length_that_nobody_can_tell_any_more_ends_the_connection(
+    module: Module, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(_: BleakGATTCharacteristic) -> int:
+        raise AttributeError("max_pdu_size")  # as on Windows, of a connection that has just ended
+
+    async with opened(module.url) as transport:
+        monkeypatch.setattr(BleakGATTCharacteristic, "max_write_without_response_size", property(gone))
+        await broken(transport.send(GET_POSE), "max_pdu_size")
+        await broken(transport.receive(), "max_pdu_size")
+
+
 async def test_a_device_that_is_forgotten_ends_with_the_next_write(module: Module) -> None:
     async with opened(module.url) as transport:
         module.vanish()
@@ -629,6 +691,23 @@ async def test_an_adapter_that_is_switched_off(world: Rig, module: Module) -> No
         assert transport.url == f"{module.url}?adapter=hci0"  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize("member", ["GetManagedObjects", "StartDiscovery", "StopDiscovery"])
+async def test_a_service_that_hangs_is_not_waited_for(
+    module: Module, monkeypatch: pytest.MonkeyPatch, member: str
+) -> None:
+    monkeypatch.setattr(ble_scan, "PATIENCE", 0.1)
+    for called in [called for called in bluez.HANDLERS if called[1] == member]:
+        monkeypatch.setitem(bluez.HANDLERS, called, lambda *_: None)
+
+    module.in_range = member == "StopDiscovery"
+    if module.in_range:  # what was to be stopped is not needed any more
+        async with opened(module.url) as transport:
+            assert await ask(transport) == c.GET_POSE.id
+    else:
+        with pytest.raises(ConnectFailed, match="service does not answer; restart it"):
+            await open_transport(module.url, arm="magician")
+
+
 async def test_an_adapter_that_is_not_there(module: Module) -> None:
     with pytest.raises(ConnectFailed, match="no such Bluetooth adapter"):
         await open_transport("ble:?adapter=hci7", arm="magician")
@@ -673,6 +752,26 @@ async def test_an_opening_that_is_cancelled_leaves_nothing(module: Module, step:
     module.watch = lambda _: None
     async with opened(module.url) as transport:
         assert await ask(transport) == c.GET_POSE.id
+
+
+async def test_an_arm_that_is_found_when_nobody_wants_it_any_more_is_free(
+    module: Module, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opening = asyncio.create_task(open_transport(module.url, arm="magician"))
+    stop = bluez.HANDLERS[ADAPTER, "StopDiscovery"]
+
+    def cancelling(service: bluez.BlueZ, call: Message) -> None:
+        opening.cancel()
+        stop(service, call)
+
+    monkeypatch.setitem(bluez.HANDLERS, (ADAPTER, "StopDiscovery"), cancelling)
+    with pytest.raises(asyncio.CancelledError) as caught:
+        await opening
+
+    taken = ble_claim.claim(module.address)
+    assert taken, f"it is free only when nobody holds {caught} any more"
+    taken.drop()
+    assert module.connections == 0
 
 
 async def test_a_question_for_the_version_that_is_cancelled_is_no_obstacle_later(
@@ -764,18 +863,25 @@ def test_every_error_says_what_to_do(error: Exception, says: str, passing: bool)
 
 
 async def test_a_whole_call_comes_to_its_end() -> None:
-    done = asyncio.Event()
+    begun, may, done = asyncio.Event(), asyncio.Event(), asyncio.Event()
 
     async def work() -> str:
-        await asyncio.sleep(0.01)
+        begun.set()
+        await may.wait()
         done.set()
         return "done"
 
+    asyncio.get_running_loop().call_soon(may.set)
     assert await whole(work()) == "done"
-    done.clear()
+    for event in (begun, may, done):
+        event.clear()
+
     task = asyncio.create_task(whole(work()))
-    await asyncio.sleep(0)
+    await begun.wait()
     task.cancel()
+    await asyncio.sleep(0)
+    assert not task.done()
+    may.set()
     with pytest.raises(asyncio.CancelledError):
         await task
 
@@ -830,6 +936,50 @@ def test_the_least_round_trip(radio: Radio, request_bytes: int, reply_bytes: int
 def test_a_radio_that_cannot_be(details: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"is 0.0075 to 4 s|expected an mtu"):
         Radio(**details)
+
+
+class SlowSelector(selectors.SelectSelector):
+    """Waits longer."""
+
+    def select(self, timeout: float | None = None) -> Any:
+        """Waits."""
+        return super().select(timeout and timeout * SLOW)
+
+
+class SlowMotion(asyncio.SelectorEventLoop):
+    """A loop on which everything takes longer, but for what the computer has to do, which so counts for less."""
+
+    def __init__(self) -> None:
+        super().__init__(SlowSelector())
+
+    def time(self) -> float:
+        """The time."""
+        return time.monotonic() / SLOW
+
+
+@pytest.mark.parametrize(
+    ("request_", "mtu", "pace"),
+    [(GET_POSE, 23, 0.02), (PARAMS, 23, 0.02), (PARAMS, 23, 0.0), (GET_POSE, 247, 0.02), (PARAMS, 247, 0.02)],
+)
+def test_round_trips_are_as_short_as_the_radio_lets_them_be(request_: bytes, mtu: int, pace: float) -> None:
+    """However busy the machine is, some are; if the driver misses an event by itself, none is."""
+    radio = Radio(interval=FAST, mtu=mtu)
+
+    async def measure() -> None:
+        loop = asyncio.get_running_loop()
+        async with simulate(listen=f"ble:?interval={FAST}&mtu={mtu}") as sim, opened(f"{sim.url}?pace={pace}") as air:
+            await air.send(request_)
+            answer = await frames(air)  # it comes with an event
+            limit = round_trip(radio, len(request_), len(encode(answer[0])), pace)
+            took = math.inf
+            while took > 1.15 * limit:
+                began = loop.time()
+                await air.send(request_)
+                await frames(air)
+                took = loop.time() - began
+
+    with asyncio.Runner(loop_factory=SlowMotion) as runner:
+        runner.run(measure())
 
 
 # A whole Magician.
@@ -984,7 +1134,7 @@ async def test_the_arm_goes_on_when_the_service_comes_back(world: Rig, module: M
         motion = await arm.queue.move_to(220, 60, 40)
         await world.stop()
         reading = asyncio.create_task(arm.get_pose(timeout=IN_TIME))
-        await asyncio.sleep(0.1)
+        await until(lambda: arm.link.state.value is LinkState.REOPENING)
         await world.start()
         assert math.isfinite((await reading).x)
         await motion
@@ -992,6 +1142,8 @@ async def test_the_arm_goes_on_when_the_service_comes_back(world: Rig, module: M
 
 
 async def test_the_same_arm_is_reached_again_and_no_other_one(world: Rig, module: Module, sim: Simulation) -> None:
+    service = world.bluez
+    assert service
     async with simulate() as other, asyncio.timeout(IN_TIME):
         stranger = world.add(other, fast())
         stranger.in_range = False
@@ -1000,7 +1152,12 @@ async def test_the_same_arm_is_reached_again_and_no_other_one(world: Rig, module
             module.in_range = False
             module.lose()
             reading = asyncio.create_task(arm.get_pose(timeout=IN_TIME))
-            await asyncio.sleep(0.3)
+            await until(lambda: service.scanning)
+            async with ble_scan.listening() as heard:  # the same scan as that of the driver, which hears all this, too
+                strangers = 0
+                while strangers < 3:
+                    strangers += (await heard.get()).device.address == stranger.address
+
             assert not reading.done()
             module.in_range = True
             await reading

@@ -5,7 +5,9 @@ from __future__ import annotations
 from urllib.parse import urlsplit
 
 import pytest
+import serial
 
+from dobot_async import ConnectFailed
 from dobot_async.transports import SCHEMES, open_transport
 from dobot_async.transports.base import options
 
@@ -109,15 +111,17 @@ def test_options_are_converted() -> None:
         ("serial:///dev/tty.usbserial-A1B2", "/dev/tty.usbserial-A1B2", 115200),
     ],
 )
-def test_the_path_of_a_port_is_taken_as_it_is(url: str, path: str, baud: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[str, int]] = []
+async def test_the_path_of_a_port_is_taken_as_it_is(
+    url: str, path: str, baud: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[str | None, int]] = []
 
-    def take(port: str, *, baudrate: int, **rest: object) -> None:
-        asked.append((port, baudrate))
-        raise StopAsyncIteration
+    def take(port: serial.Serial) -> None:
+        asked.append((port.port, port.baudrate))
+        raise OSError("somebody else has it")
 
-    monkeypatch.setattr("serial.serial_for_url", take)
-    with pytest.raises((StopAsyncIteration, RuntimeError)):
-        open_transport(url, arm="magician").send(None)
+    monkeypatch.setattr(serial.Serial, "open", take)
+    with pytest.raises(ConnectFailed, match="somebody else has it"):
+        await open_transport(url, arm="magician")
 
     assert asked == [(path, baud)]
