@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
 from itertools import count
 
 import pytest
+from bad_line import BadLine, Spoil, bad_lines
 from virtual import virtual
 
 from dobot_async import ConnectFailed, Magician, MotionStopped, MotionUnknown, PTPMode, ReplyTimeout
@@ -15,62 +15,12 @@ from dobot_async.magician import commands as c
 from dobot_async.magician.executor import Surplus
 from dobot_async.magician.frame import Frame, Parser
 from dobot_async.simulator import DeviceOptions, Faults, Simulation, simulate
-from dobot_async.transports import Transport
-
-Spoil = Callable[[bytes], list[tuple[float, bytes]]]
-
-
-class BadLine:
-    """A line to a simulation in memory on which a test decides what becomes of each message."""
-
-    in_flight = window = 1
-
-    def __init__(self, inner: Transport, *, disorder: float = 0.0) -> None:
-        self.disorder = disorder
-        self.request: Spoil = lambda data: [(0, data)]
-        self.reply: Spoil = lambda data: [(0, data)]
-        self._inner = inner
-        self._arrived: asyncio.Queue[bytes] = asyncio.Queue()
-        self._pump = asyncio.create_task(self._read())
-
-    async def _read(self) -> None:
-        loop = asyncio.get_running_loop()
-        while True:
-            message = await self._inner.receive()
-            for delay, data in self.reply(message):
-                loop.call_later(delay, self._arrived.put_nowait, data)
-
-    async def send(self, data: bytes) -> None:
-        """Sends what is left of a message."""
-        for delay, each in self.request(data):
-            assert delay == 0
-            await self._inner.send(each)
-
-    async def receive(self) -> bytes:
-        """Returns the next message that has arrived."""
-        return await self._arrived.get()
-
-    async def aclose(self) -> None:
-        """Closes the line."""
-        self._pump.cancel()
-        await asyncio.wait([self._pump])
-        await self._inner.aclose()
 
 
 @pytest.fixture
 def lines(monkeypatch: pytest.MonkeyPatch) -> list[BadLine]:
     """The bad lines over which `sim://` is reached from now on."""
-    from dobot_async import family
-    from dobot_async.transports import open_transport
-
-    made: list[BadLine] = []
-
-    async def opened(url: str, *, arm: str) -> Transport:
-        made.append(BadLine(await open_transport(url, arm=arm)))
-        return made[-1]
-
-    monkeypatch.setattr(family, "open_transport", opened)
-    return made
+    return bad_lines(monkeypatch)
 
 
 def targets(sim: Simulation) -> list[float]:

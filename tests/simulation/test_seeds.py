@@ -20,6 +20,7 @@ HARD = {
     37856: "an alarm that two readers find at once",
     41596: "a restart that is found while the alarms are being cleared",
     46348: "a full queue on a paused arm whose books were opened with difficulty",
+    702423: "a command that the network doubles in front of one that may go out at once",
     403548: "two urgent calls of one command, of which the first one's proof is lost",
     83242: "books from before a power failure",
 }
