@@ -1,19 +1,37 @@
-"""What the tests of Zenoh share: places and sessions that are confined to the loopback interface."""
+"""What the tests of Zenoh share: places and sessions that are confined to the loopback interface, and processes."""
 
 from __future__ import annotations
 
 import asyncio
 import json
+import os
 import socket
+import sys
+import threading
+from asyncio.subprocess import PIPE, Process
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import zenoh
 
-__all__ = ["configured", "connect_to", "endpoint", "keep", "place", "session", "warm_up", "written"]
+__all__ = [
+    "configured",
+    "connect_to",
+    "endpoint",
+    "keep",
+    "line",
+    "place",
+    "processes_ended",
+    "program",
+    "session",
+    "warm_up",
+    "written",
+]
+
+IN_TIME = 20.0
 
 
 def endpoint(protocol: str = "tcp") -> str:
@@ -88,3 +106,39 @@ def written(path: Path, **settings: Any) -> Path:
     """A configuration file."""
     path.write_text(str(configured(**settings)), encoding="utf-8")
     return path
+
+
+@asynccontextmanager
+async def program(*arguments: str, before: tuple[str, ...] = ()) -> AsyncIterator[Process]:
+    """A Python process, killed in the end, without settings of this one's user."""
+    process = await asyncio.create_subprocess_exec(
+        *before,
+        *(sys.executable, "-W", "error", *arguments),
+        stdout=PIPE,
+        stderr=PIPE,
+        env={name: value for name, value in os.environ.items() if not name.startswith(("DOBOT", "ZENOH"))},
+    )
+    try:
+        yield process
+    finally:
+        with suppress(ProcessLookupError):
+            process.kill()
+
+        await process.communicate()
+
+
+async def line(process: Process) -> str:
+    """The next line that a process prints."""
+    assert process.stdout
+    assert process.stderr
+    async with asyncio.timeout(IN_TIME):
+        told = await process.stdout.readline()
+        assert told, (await process.stderr.read()).decode()
+        return told.decode().strip()
+
+
+def processes_ended() -> None:
+    """Lets the threads end with which asyncio waits for processes; they outlive these for a moment."""
+    for thread in threading.enumerate():
+        if thread.name.startswith("asyncio-waitpid"):
+            thread.join(1)

@@ -17,16 +17,16 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
+from dobot_async.bridge.desk import Desk, Refused, Request
 from dobot_async.bridge.limits import Allowance, Limits
 from dobot_async.bridged import Bridged, Kind, Watch
 from dobot_async.contract import Frame
 from dobot_async.errors import DobotError
 from dobot_async.turns import Turns
 
-__all__ = ["Client", "Desk", "Refused"]
+__all__ = ["Client"]
 
 F = TypeVar("F", bound=Frame)
 INBOX = 8192  # bytes
@@ -37,43 +37,6 @@ ON_THE_LINE = 4  # reads that wait for the arm
 MOST_TIMES = 8  # a read is answered at once
 AGAIN = 5.0  # seconds until the same refusal is told once more
 HALF = 0.5  # seconds after which the rest of a frame is overdue
-
-
-class Refused(Exception):
-    """A request is not passed on; the message says why. The client hears nothing: the protocol has no word for it."""
-
-
-@dataclass(slots=True)
-class Request(Generic[F]):
-    """A request.
-
-    Attributes:
-        frame: As it came.
-        kind: What it is to a bridge.
-        stops: How many stops there had been when it came.
-        times: How often it came before it was sent.
-    """
-
-    frame: F
-    kind: Kind
-    stops: int
-    times: int = 1
-
-
-class Desk(Protocol[F]):
-    """Where requests are taken."""
-
-    stops: int
-    """How often something stopped the arm; what came before the last time is not sent any more."""
-
-    async def answer(self, client: Client[F], request: Request[F]) -> F | None:
-        """Returns the arm's reply, None where the arm need not answer; raises Refused, or DobotError."""
-
-    def refused(self, client: Client[F], name: str, reason: str) -> None:
-        """Takes note that a request was not passed on."""
-
-    def cut(self, client: Client[F], reason: str) -> None:
-        """Ends a connection."""
 
 
 class Client(Generic[F]):
@@ -113,7 +76,7 @@ class Client(Generic[F]):
         self._hold = hold
         self._limits = limits
         self._loop = asyncio.get_running_loop()
-        self._parser = family.parser()
+        self._parser = family.requests()
         self._inbox = bytearray()
         self._waiting: deque[Request[F]] = deque()
         self._bytes = Allowance(limits.data, self._loop.time)
@@ -130,6 +93,7 @@ class Client(Generic[F]):
         self._writing: asyncio.Task[None] | None = None
         self._unsent: dict[Hashable, Request[F]] = {}
         self._stopping: set[Any] = set()
+        self._unanswered: deque[Request[F]] = deque()
         self._work = self._loop.create_task(self._run(), name=f"dobot_async bridge {name}")
         self._work.add_done_callback(self._ended)
 
@@ -147,10 +111,17 @@ class Client(Generic[F]):
 
         self._news.set()
 
+    def tell(self, data: bytes) -> None:
+        """Passes on what answers nothing."""
+        if not self.gone:
+            self._deliver(data)
+
     def dismiss(self) -> None:
         """Ends the connection as far as it can be ended, and is deaf and mute from now on."""
         if not self.gone:
             self.gone = True
+            self._inbox.clear()
+            self._waiting.clear()
             # A datagram client stays known, so that its later datagrams are not taken for a new client's.
             if self.ordered:
                 self._hang_up()
@@ -227,15 +198,21 @@ class Client(Generic[F]):
         """Lets requests wait; not what stops the arm."""
         for frame in frames:
             request = Request(frame, self._family.kind(frame), self._desk.stops)
-            if request.kind is Kind.WRITE:
-                self._unsent.clear()
-                self._waiting.append(request)
-            elif request.kind is Kind.READ:
+            if request.kind is Kind.READ:
                 self._ask(request)
-            elif frame.key not in self._stopping:
-                # The same stop again, while the arm has not answered the first one, would tell it nothing new.
-                self._stopping.add(frame.key)
-                self._start(request)
+                continue
+
+            self._unsent.clear()
+            subject = self._family.subject(frame)
+            if request.kind is Kind.WRITE:
+                self._take(request)
+            elif subject not in self._stopping:
+                self._stopping.add(subject)
+                request.ahead = True
+                self._take(request)
+            elif self._family.in_order:
+                # The same stop again tells the arm nothing new while it has not answered the first one.
+                self._take(request)
 
     def _ask(self, request: Request[F]) -> None:
         """Lets a read wait, or joins it with the last one of its key if that is the same and waits as well."""
@@ -245,6 +222,16 @@ class Client(Generic[F]):
             self._frames.spend(1)
         else:
             self._unsent[request.frame.key] = request
+            self._take(request)
+
+    def _take(self, request: Request[F]) -> None:
+        """Begins with a request, or lets it wait."""
+        if self._family.in_order:
+            self._unanswered.append(request)
+
+        if request.ahead:
+            self._start(request)
+        else:
             self._waiting.append(request)
 
     def _forget(self, request: Request[F]) -> None:
@@ -256,8 +243,14 @@ class Client(Generic[F]):
         """Begins with the next request when not too many are under way, and no write."""
         if self._waiting:
             await self._room.acquire()
-            if self._writing:
+            if self._family.in_order:
+                await self.settled()
+            elif self._writing:
                 await asyncio.wait([self._writing])
+
+            if not self._waiting:  # what it waited for was not answered
+                self._room.release()
+                return
 
             self._frames.spend(1)
             request = self._waiting.popleft()
@@ -276,16 +269,39 @@ class Client(Generic[F]):
             reply = await self._desk.answer(self, request)
         except (Refused, DobotError) as error:
             self._complain(self._family.name(request.frame), str(error))
+            self._answer(request, self._family.refusal(str(error)) if isinstance(error, Refused) else b"")
+            if self._family.in_order and isinstance(error, DobotError):
+                self._drop()
         else:
-            answer = b"" if reply is None else bytes(reply)
-            for _ in range(request.times if answer and not self.gone else 0):
-                self._deliver(answer)
+            self._answer(request, b"" if reply is None else bytes(reply))
         finally:
             self._forget(request)
-            if request.kind is Kind.STOP:
-                self._stopping.discard(request.frame.key)
+            if request.ahead:
+                self._stopping.discard(self._family.subject(request.frame))
             else:
                 self._room.release()
+
+    def _answer(self, request: Request[F], answer: bytes) -> None:
+        """Tells the client what has become of a request, as soon as it may hear of it."""
+        if not self._family.in_order:
+            for _ in range(request.times if answer and not self.gone else 0):
+                self._deliver(answer)
+
+            return
+
+        request.answer = answer * request.times
+        while self._unanswered and self._unanswered[0].answer is not None:
+            told = self._unanswered.popleft().answer
+            if told and not self.gone:
+                self._deliver(told)
+
+    def _drop(self) -> None:
+        """Gives up what came behind a request that was not answered: answers to it would pass for that one's."""
+        self._inbox.clear()
+        self._parser.reset()
+        self._unsent.clear()
+        while self._waiting:
+            self._answer(self._waiting.popleft(), b"")
 
     def _complain(self, name: str, reason: str) -> None:
         """Tells that a request was not passed on; not of each repetition, for it is asked again and again."""

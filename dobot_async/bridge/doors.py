@@ -178,7 +178,7 @@ def served_with(certificate: str | Path, key: str | Path | None) -> ssl.SSLConte
     """TLS for a server."""
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     try:
-        context.load_cert_chain(certificate, key)
+        context.load_cert_chain(certificate, key, password=lambda: "")  # else it would ask for one at the terminal
     except OSError as error:
         raise ValueError(f"cannot use the certificate {certificate}: {error}") from None
 

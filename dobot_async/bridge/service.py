@@ -22,11 +22,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, Literal, TypeVar
 
-from dobot_async.bridge.client import Client, Refused, Request
+from dobot_async.bridge.client import Client
+from dobot_async.bridge.desk import Refused, Request
+from dobot_async.bridge.lease import Lease
 from dobot_async.bridge.limits import Limits
+from dobot_async.bridge.line import Line
 from dobot_async.bridged import Bridged, Kind
 from dobot_async.contract import Frame, LinkState
-from dobot_async.errors import ConnectionLost, DobotError, ReplyTimeout
+from dobot_async.errors import ProtocolError, ReplyTimeout
 from dobot_async.events import Events
 from dobot_async.link import Link
 
@@ -34,8 +37,6 @@ __all__ = ["Bridge", "BridgeEvent"]
 
 F = TypeVar("F", bound=Frame)
 logger = logging.getLogger("dobot_async.bridge")
-STOPPED_WITHIN = 1.0  # seconds until what stops the arm is said again
-LOOKS, LOOK = 3, 0.05  # how often, and how many seconds apart, an arm is seen to stand that need not say so
 FAREWELL = 2.0
 
 
@@ -85,15 +86,14 @@ class Bridge(Generic[F]):
         self.events: Events[BridgeEvent] = Events()
         self.stops = 0
         self.family = family
-        self._takeover = takeover
-        self._on_vanish = on_vanish
         self._denied = denied
         self._limits = limits
         self._clients: set[Client[F]] = set()
         self._ended = False
-        self._holder: Client[F] | None = None
-        self._lease = asyncio.Lock()
+        self._line = Line(link, family)
+        self._lease = Lease(self._line, family, takeover=takeover, on_vanish=on_vanish, cut=self.cut, tell=self._tell)
         self._farewells: set[asyncio.Task[None]] = set()
+        link.stray = self._unasked
         self._watching = asyncio.create_task(self._watch_link(), name="dobot_async bridge link")
 
     @property
@@ -104,7 +104,7 @@ class Bridge(Generic[F]):
     @property
     def holder(self) -> str | None:
         """Who may move the arm, None while nobody does."""
-        return self._holder.name if self._holder else None
+        return self._lease.holder.name if self._lease.holder else None
 
     @property
     def clients(self) -> int:
@@ -117,11 +117,11 @@ class Bridge(Generic[F]):
         Args:
             reply: The arm's answer to the question of a `Watch`.
         """
-        return self._holder.watch.moving(reply) if self._holder else None
+        return self._lease.holder.watch.moving(reply) if self._lease.holder else None
 
     async def ask(self, frame: F) -> F:
         """Returns the arm's reply to a read of the bridge's own; raises DobotError if there is none."""
-        return await self._forward(frame)
+        return await self._line.ask(frame)
 
     def client(
         self,
@@ -155,7 +155,7 @@ class Bridge(Generic[F]):
         """Ends a connection."""
         self._tell("cut", client, reason)
         client.dismiss()
-        self._begin(self._end_lease(client))  # a datagram client leaves later
+        self._begin(self._lease.end(client))  # a datagram client leaves later
 
     def refused(self, client: Client[F], name: str, reason: str) -> None:
         """Takes note that a request was not passed on."""
@@ -167,10 +167,14 @@ class Bridge(Generic[F]):
 
     async def answer(self, client: Client[F], request: Request[F]) -> F | None:
         """Returns the arm's reply; raises Refused, or DobotError if there should be one."""
-        if request.frame.key in self._denied:
+        if self.family.subject(request.frame) in self._denied:
             raise Refused("it is denied here")
 
-        self.family.check(request.frame)
+        try:
+            self.family.check(request.frame)
+        except ProtocolError as error:
+            raise Refused(str(error)) from None
+
         try:
             return await self._pass_on(client, request)
         except ReplyTimeout:
@@ -214,27 +218,27 @@ class Bridge(Generic[F]):
 
         await client.reads.take(frame.key, 0)
         try:
-            return await self._forward(frame, ready=partial(client.sending, request))
+            return await self._line.ask(frame, ready=partial(client.sending, request))
         finally:
             client.reads.give(frame.key)
 
     async def _stop(self, client: Client[F], frame: F) -> F:
         """Passes on what stops the arm; nothing that was to be written before it is sent after it."""
         self.stops += 1
-        if self._holder and self._holder is not client and not self._holder.gone:
-            self.cut(self._holder, f"{client.name} has stopped the arm")
+        holder = self._lease.holder
+        if holder and holder is not client and not holder.gone:
+            self.cut(holder, f"{client.name} has stopped the arm")
 
         client.watch.sent(frame)
-        return await self._forward(frame, urgent=True)
+        return await self._line.ask(frame, urgent=True)
 
     async def _write(self, client: Client[F], request: Request[F]) -> F:
         """Passes on what changes something, once, for the holder of the lease."""
         frame = request.frame
-        await self._take_lease(client)
+        await self._lease.take(client)
 
         def ready() -> None:
-            self._check(client)
-            if self._holder is not client:
+            if client.gone or self._lease.holder is not client:
                 raise Refused("the lease has ended")
 
             if request.stops != self.stops:
@@ -242,128 +246,30 @@ class Bridge(Generic[F]):
 
             client.watch.sent(frame)
 
-        reply = await self._forward(frame, ready=ready)
+        reply = await self._line.ask(frame, ready=ready)
         client.watch.answered(frame, reply)
         return reply
 
-    async def _forward(self, frame: F, *, ready: Callable[[], None] = lambda: None, urgent: bool = False) -> F:
-        """Sends a frame to the arm and returns its reply."""
-        family = self.family
-        return await self.link.forward(
-            frame,
-            partial(family.accept, frame),
-            name=family.name(frame),
-            timeout=family.patience(frame),
-            repeatable=family.repeatable(frame),
-            urgent=urgent,
-            ready=ready,
-        )
-
-    def _check(self, client: Client[F]) -> None:
-        """Raises if a client has gone: what it has not sent to the arm yet is forgotten."""
-        if client.gone:
-            raise Refused("the client has gone")
-
-    async def _take_lease(self, client: Client[F]) -> None:
-        """Returns when this client may write."""
-        async with self._lease:
-            holder = self._holder
-            if holder is client:
-                return
-
-            self._check(client)
-            if holder and not holder.gone:
-                if not self._takeover:
-                    raise Refused(f"{holder.name} moves the arm")
-
-                self.cut(holder, f"{client.name} takes over")
-
-            if holder:
-                await self._release(holder)
-
-            self._holder = client
-            self._tell("lease", client, "moves the arm from now on")
+    def _unasked(self, frame: F) -> None:
+        """The arm has said something that nobody waits for."""
+        if self._lease.holder and self.family.aside(frame):
+            self._lease.holder.tell(bytes(frame))
 
     async def _farewell(self, client: Client[F]) -> None:
         """Ends the lease of a client that has gone, and lets its last requests end."""
         try:
-            await self._end_lease(client)
+            await self._lease.end(client)
             await client.settled()
         finally:
             self._tell("left", client)
             await client.aclose()
             self._clients.discard(client)
 
-    async def _end_lease(self, client: Client[F]) -> None:
-        """Ends the lease of a client, if it has it."""
-        async with self._lease:
-            if self._holder is client:
-                await self._release(client)
-
     def _begin(self, work: Coroutine[Any, Any, None]) -> None:
         """Begins with what the end of the bridge waits for."""
         task = asyncio.create_task(work, name="dobot_async bridge farewell")
         self._farewells.add(task)
         task.add_done_callback(self._farewells.discard)
-
-    async def _release(self, holder: Client[F]) -> None:
-        """Ends a lease; stops the arm first if it is in the middle of something."""
-        with suppress(ConnectionLost):
-            if self._on_vanish == "stop" and await self._moves_for(holder):
-                await self._halt(holder)
-
-        self._holder = None
-        self._tell("released", holder, "anybody may move the arm")
-
-    async def _moves_for(self, holder: Client[F]) -> bool:
-        """Whether the arm is, or may be, in the middle of what a client has told it."""
-        if not holder.watch.moving(None):
-            return False
-
-        try:
-            return holder.watch.moving(await self._forward(holder.watch.question))
-        except ConnectionLost:
-            raise
-        except DobotError:
-            return True
-
-    async def _halt(self, holder: Client[F]) -> None:
-        """Stops the arm; says it until the arm has heard it, or the link is gone for good."""
-        while True:
-            await self.link.opened()
-            said = (self._urge(frame) for frame in self.family.stopping)
-            heard = await asyncio.gather(*said, return_exceptions=True)
-            if isinstance(heard[0], ConnectionLost):
-                raise heard[0]
-
-            if await self._obeys(holder, heard[0]):
-                self._tell("stopped", holder, "it has gone, and the arm was in motion")
-                return
-
-    async def _obeys(self, holder: Client[F], answer: object) -> bool:
-        """Whether an arm that was told to stop does so: it has said so, or is seen to stand."""
-        if self.family.proves_stop:
-            return not isinstance(answer, BaseException)
-
-        holder.watch.sent(self.family.stopping[0])
-        for _ in range(LOOKS):
-            if await self._moves_for(holder):
-                return False
-
-            await asyncio.sleep(LOOK)
-
-        return True
-
-    async def _urge(self, frame: F) -> F:
-        """Says one of the things that stop the arm, again and again for a while."""
-        return await self.link.forward(
-            frame,
-            partial(self.family.accept, frame),
-            name=self.family.name(frame),
-            timeout=STOPPED_WITHIN,
-            repeatable=True,
-            urgent=True,
-        )
 
     async def _watch_link(self) -> None:
         """Tells when the link to the arm breaks and comes back."""

@@ -44,7 +44,7 @@ async def bridge(
     Args:
         arm_url: The arm, on any transport.
         listen: Where programs reach it: `tcp://host:port`, `udp://host:port`, `ws://host:port`, `pty`; or several of
-            them. Port 0 takes a free one.
+            them. Port 0 takes a free one. An ultraArm cannot be reached by udp.
         token: What clients have to present. Where it listens on more than this computer's own addresses there is
             always one: it is made up if none is given.
         takeover: Whoever writes takes the lease from who has it; else the first one keeps it.
@@ -68,6 +68,12 @@ async def bridge(
 
     limits = limits or Limits()
     doors = Doors.of([listen] if isinstance(listen, str) else listen, token, certificate, key, origins)
+    if known.in_order and any(place.scheme == "udp" for place in doors.places):
+        raise ValueError(
+            f"{family} cannot be bridged to udp: nothing but their order tells whose its answers are, and datagrams "
+            "have none; listen at tcp, ws, zenoh or pty"
+        )
+
     async with AsyncExitStack() as stack:
         link = await linked(arm_url, known, timeout)
         running: Bridge[Any] = Bridge(
@@ -91,7 +97,10 @@ async def linked(url: str, family: Bridged[F], timeout: float) -> Link[F]:
     transport = await family.open(url, timeout)
     # `ble:` may be any arm at first, but not another one later.
     again = partial(family.open, getattr(transport, "url", url), timeout)
-    return Link(transport, family.parser(), family.encode, url=url, filler=family.filler, reopen=again)
+    parser = family.parser()
+    link = Link(transport, parser, family.encode, url=url, filler=family.filler, reopen=again)
+    family.attach(link, parser)
+    return link
 
 
 async def greet(link: Link[F], family: Bridged[F], timeout: float) -> None:

@@ -9,7 +9,7 @@ from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from dobot_async.bridge.doors import FIRST_LINE, LONGEST_LINE, Guard
+from dobot_async.bridge.doors import FIRST_LINE, LONGEST_LINE, STRANGERS, Guard
 from dobot_async.transports.listen import Host, url_of
 from dobot_async.transports.websocket import PING, PONG_WITHIN, quiet, websockets
 
@@ -37,6 +37,7 @@ async def on_ws(
         max_queue=4,
         ping_interval=PING,
         ping_timeout=PONG_WITHIN,
+        open_timeout=FIRST_LINE,
         close_timeout=0.5,
         logger=quiet(),
         server_header=None,
@@ -52,6 +53,7 @@ class Door:
     def __init__(self, host: Host[Any], guard: Guard) -> None:
         self._host = host
         self._guard = guard
+        self._strangers = 0
 
     def look(self, connection: Any, request: Any) -> Any:
         """Called with each request for a connection; returns a response to refuse it.
@@ -96,11 +98,17 @@ class Door:
 
     async def _hear_token(self, connection: Any) -> bool:
         """Whether the first message is the token, in time."""
+        if self._strangers == STRANGERS:
+            return False
+
+        self._strangers += 1
         try:
             async with asyncio.timeout(FIRST_LINE):
                 first = await connection.recv()
         except TimeoutError:
             return False
+        finally:
+            self._strangers -= 1
 
         line = isinstance(first, str) and len(first) <= LONGEST_LINE and first.startswith(TOKEN)
         return line and self._guard.knows(first.removeprefix(TOKEN).strip())

@@ -3,8 +3,8 @@
     token of a client + its query --> let in --> messages --> Host.client(...).send
     its token goes                --> Host.leave, as if a line were cut
 
-Nothing here waits for a client: an answer that Zenoh cannot take at once is dropped, and the client then finds that a
-message is missing, and takes the connection for broken.
+Nothing here waits for a client: what it is answered goes by way of its own `Outbox`, and whatever else it is told is
+little, and dropped if Zenoh cannot take it at once.
 """
 
 from __future__ import annotations
@@ -12,17 +12,21 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+from collections.abc import Callable
 from contextlib import AsyncExitStack, suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import SplitResult
 
-from dobot_async.bridge.client import Client
+from dobot_async.bridge.limits import Allowance
 from dobot_async.bridge.service import Bridge
 from dobot_async.bridge.telemetry import Telemetry
 from dobot_async.errors import ConnectFailed
+from dobot_async.transports.tasks import whole
+from dobot_async.transports.zenoh_messages import DATA, END, Lost, Numbered, Outbox
 from dobot_async.transports.zenoh_place import Place, address, library
-from dobot_async.transports.zenoh_session import DATA, END, VERSION, Keys, Lost, Numbered, Session
+from dobot_async.transports.zenoh_session import VERSION, Keys, Session
 
 if TYPE_CHECKING:
     import zenoh
@@ -32,7 +36,8 @@ __all__ = ["on_zenoh"]
 HELD = 65_536
 """Bytes that are kept of a client that has to wait; one that sends more than that is cut off."""
 
-LONGEST_NAME = 80
+STRANGERS = 100  # answers a second to those who are no clients, all together
+LONGEST_NAME, LONGEST_INTRODUCTION = 80, 1024
 EVERYWHERE = {"/0.0.0.0:": "/127.0.0.1:", "/[::]:": "/[::1]:"}
 
 
@@ -72,17 +77,20 @@ class Door:
     """Lets clients in.
 
     Attributes:
+        bridge: Where they go in.
         session: The session.
         keys: The keys of the arm.
     """
 
     def __init__(self, bridge: Bridge[Any], place: Place) -> None:
         self.keys = Keys(place.name)
-        self._bridge = bridge
         self.session = Session(place, serving=True)
+        self.bridge = bridge
         self._name = place.name
         self._present: set[str] = set()
         self._guests: dict[str, Guest] = {}
+        self._leaving: set[asyncio.Task[None]] = set()
+        self._told = Allowance(STRANGERS, asyncio.get_running_loop().time)
         self._token: zenoh.LivelinessToken | None = None
 
     async def open(self) -> None:
@@ -96,32 +104,56 @@ class Door:
         if await self.session.tokens(f"{self.keys.arm}/*/*"):
             raise ConnectFailed(f"an arm called {self._name} is on Zenoh already; give this one another name")
 
-        key = f"{self.keys.arm}/{self._bridge.family.model}/{self.session.id}"
+        key = f"{self.keys.arm}/{self.bridge.family.model}/{self.session.id}"
         self._token = self.session.raw.liveliness().declare_token(key)
 
     async def aclose(self) -> None:
-        """Takes back the name, and ends the session."""
-        for name in list(self._guests):
-            self.leave(name, "the arm is not served any more")
+        """Tells all clients, takes back the name, and ends the session; takes a few seconds at most."""
+        self.session.crossing.close()
+        for guest in list(self._guests.values()):
+            self.leave(guest, "the arm is not served any more")
+
+        await whole(self._end())
+
+    def way(self, name: str, *, waits: bool) -> Callable[[bytes], None]:
+        """Returns the way to a client."""
+        return self.session.way(f"{self.keys.link}/{name}/down", waits=waits)
+
+    def cut(self, guest: Guest, why: str) -> None:
+        """Ends the connection of a client that does what it must not."""
+        if self._guests.get(guest.name) is guest:
+            self.bridge.cut(guest.peer, why)
+            self.leave(guest, why)
+
+    def leave(self, guest: Guest, why: str) -> None:
+        """Ends the connection of a client, as far as there is one."""
+        if self._guests.get(guest.name) is guest:
+            del self._guests[guest.name]
+            self.bridge.leave(guest.peer)
+            guest.outbox.end(why)
+            leaving = asyncio.create_task(guest.outbox.aclose(), name=f"dobot_async zenoh farewell {guest.name}")
+            self._leaving.add(leaving)
+            leaving.add_done_callback(self._leaving.discard)
+
+    async def _end(self) -> None:
+        if self._leaving:
+            await asyncio.wait(self._leaving)
 
         await self.session.aclose()
 
     def _begin(self, session: zenoh.Session) -> None:
         """Listens for clients, before they can know of the arm."""
         put, cross, link = library().SampleKind.PUT, self.session.crossing.to, self.keys.link
-        session.declare_subscriber(f"{link}/*/up", self._messages())
+        session.declare_subscriber(f"{link}/*/up", cross(self._heard, read_message, self._weigh))
         session.declare_queryable(f"{link}/*", cross(self._asked, lambda query: query))
         session.liveliness().declare_subscriber(
             f"{link}/*", cross(self._notice, lambda sample: (last(sample.key_expr), sample.kind == put)), history=True
         )
 
-    def _messages(self) -> Any:
-        """The handler of what clients send; each message counts with its size."""
-
-        def read(sample: zenoh.Sample) -> tuple[str, bytes]:
-            return str(sample.key_expr).split("/")[-2], sample.payload.to_bytes()
-
-        return self.session.crossing.to(self._heard, read, lambda message: (message[0], len(message[1])))
+    def _weigh(self, message: tuple[str, bytes]) -> tuple[str, int]:
+        """Whose share of the way in a message takes: strangers, who may call themselves anything, have one together."""
+        name, data = message
+        return name if name in self._guests else "", len(data)
 
     def _notice(self, change: tuple[str, bool]) -> None:
         """A client's token has come or gone."""
@@ -130,10 +162,15 @@ class Door:
             self._present.add(name)
         else:
             self._present.discard(name)
-            self.leave(name, "its token has gone")
+            guest = self._guests.get(name)
+            if guest:
+                self.leave(guest, "its token has gone")
 
     def _asked(self, query: zenoh.Query) -> None:
         """Somebody wants to be let in; asks again if the answer does not arrive."""
+        if not self._may_tell():
+            return
+
         name = last(query.key_expr)
         given = introduction(query)
         if given is None:
@@ -152,75 +189,59 @@ class Door:
         guest = self._guests.get(name)
         if guest:
             guest.send(data)
-        else:
-            self.put(name, Numbered().pack(b"its connection has ended", END))
+        elif self._may_tell():
+            with suppress(library().ZError):
+                self.way(name, waits=False)(Numbered().pack(b"its connection has ended", END))
 
-    def put(self, name: str, message: bytes) -> None:
-        """Sends a message to a client; drops it if Zenoh cannot take it."""
-        with suppress(library().ZError):
-            self.session.put(f"{self.keys.link}/{name}/down", message, waits=False)
+    def _may_tell(self) -> bool:
+        """Whether somebody who is no client can be answered: not everybody who asks without end."""
+        if self._told.wait:
+            return False
 
-    def leave(self, name: str, why: str) -> None:
-        """Ends the connection of a client, as far as there is one."""
-        guest = self._guests.pop(name, None)
-        if guest:
-            self.put(name, guest.farewell(why))
-            self._bridge.leave(guest.peer)
-
-    def client(self, guest: Guest, name: str) -> Client[Any]:
-        """What the bridge keeps of a client."""
-        return self._bridge.client(guest.deliver, guest.hang_up, ordered=True, hold=guest.hold, name=name)
+        self._told.spend(1)
+        return True
 
 
 class Guest:
     """A client that was let in.
 
     Attributes:
+        name: The name of its keys.
+        outbox: What goes to it.
         peer: What the bridge keeps of it.
     """
 
     def __init__(self, door: Door, name: str, shown: str) -> None:
+        self.name = name
+        self.outbox = Outbox(door.way(name, waits=True), partial(door.cut, self), name)
         self._door = door
-        self._name = name
-        self._up = Numbered()
-        self._down = Numbered()
+        self._numbers = Numbered()
         self._held = False
         self._waiting = bytearray()
-        self._ended = False
-        self.peer = door.client(self, shown)
+        self.peer = door.bridge.client(self.outbox.send, self._hang_up, ordered=True, hold=self._hold, name=shown)
 
     def send(self, message: bytes) -> None:
         """It has sent something."""
         try:
-            taken = self._up.unpack(message)
+            taken = self._numbers.unpack(message)
         except Lost as error:
-            self._door.leave(self._name, str(error))
+            self._door.cut(self, str(error))
             return
 
         if taken and taken[0] == DATA:
             self._waiting += taken[1]
             self._pass_on()
             if len(self._waiting) > HELD:
-                self._door.leave(self._name, "it sends more than it may")
+                self._door.cut(self, "it sends more than it may")
 
-    def deliver(self, data: bytes) -> None:
-        """Sends it something."""
-        if not self._ended:
-            self._door.put(self._name, self._down.pack(data))
-
-    def hang_up(self) -> None:
+    def _hang_up(self) -> None:
         """Ends its connection soon."""
-        asyncio.get_running_loop().call_soon(self._door.leave, self._name, "the bridge has ended this connection")
+        asyncio.get_running_loop().call_soon(self._door.leave, self, "the bridge has ended this connection")
 
-    def hold(self, held: bool) -> None:
+    def _hold(self, held: bool) -> None:
         """Keeps what it sends, or passes it on again."""
         self._held = held
         self._pass_on()
-
-    def farewell(self, why: str) -> bytes:
-        """Returns the last message."""
-        self._ended = True
-        return self._down.pack(why.encode(), END)
 
     def _pass_on(self) -> None:
         if self._waiting and not self._held:
@@ -231,8 +252,9 @@ class Guest:
 
 def introduction(query: zenoh.Query) -> str | None:
     """What a client calls itself, for people; None if it speaks another version."""
-    with suppress(ValueError, TypeError, AttributeError):
-        told = json.loads(query.payload.to_bytes() if query.payload else b"")
+    payload = query.payload.to_bytes() if query.payload else b""
+    with suppress(ValueError, AttributeError, RecursionError):
+        told = json.loads(payload) if len(payload) <= LONGEST_INTRODUCTION else {}
         if told.get("version") == VERSION:
             return printable(str(told.get("who", "")))[:LONGEST_NAME]
 
@@ -242,6 +264,11 @@ def introduction(query: zenoh.Query) -> str | None:
 def printable(text: str) -> str:
     """What a client calls itself, without anything that a terminal would obey."""
     return "".join(character if character.isprintable() else "?" for character in text)
+
+
+def read_message(sample: zenoh.Sample) -> tuple[str, bytes]:
+    """Who has sent a message, and the message."""
+    return str(sample.key_expr).split("/")[-2], sample.payload.to_bytes()
 
 
 def last(key: zenoh.KeyExpr) -> str:

@@ -21,8 +21,9 @@ import anyio
 from dobot_async.errors import ConnectFailed
 from dobot_async.transports.base import MANY, Transport
 from dobot_async.transports.network import WINDOW
-from dobot_async.transports.zenoh_place import Place, library, reason
-from dobot_async.transports.zenoh_session import DATA, END, VERSION, Keys, Lost, Numbered, Session
+from dobot_async.transports.zenoh_messages import DATA, END, Lost, Numbered, Outbox
+from dobot_async.transports.zenoh_place import Place, library
+from dobot_async.transports.zenoh_session import VERSION, Keys, Session
 
 if TYPE_CHECKING:
     import zenoh
@@ -32,6 +33,8 @@ __all__ = ["ZenohTransport", "open_url"]
 PRESENT = 3.0  # seconds until the arm's token must have been seen
 LET_IN = 2.0
 ASK_AGAIN = 0.1
+UNREAD = 1 << 20
+"""Bytes that may wait for a program that does not receive them; the connection of one that leaves more is over."""
 
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:
@@ -62,9 +65,10 @@ class ZenohTransport:
         self._session = Session(place)
         self._link = ""
         self._token: zenoh.LivelinessToken | None = None
-        self._up = Numbered()
+        self._up: Outbox | None = None
         self._down = Numbered()
         self._arrived: deque[bytes] = deque()
+        self._unread = 0
         self._servers: set[str] = set()
         self._server: str | None = None
         self._news = asyncio.Event()
@@ -89,12 +93,9 @@ class ZenohTransport:
                 "?config=FILE), and may this program in? `dobot-async discover` lists those that it can see"
             ) from None
 
-        arms = {*self._servers, *await self._session.tokens(f"{self._keys.arm}/*/*")}
-        if len(arms) > 1:
-            raise ConnectFailed(f"{len(arms)} arms are called {self._name} on Zenoh; rename all but one")
-
-        (self._server,) = arms
-        model = self._server.split("/")[-2]
+        known = await self._session.tokens(f"{self._keys.arm}/*/*")
+        server = self._only({*self._servers, *known})
+        model = server.split("/")[-2]
         if model != arm:
             raise ConnectFailed(f"{where} is a {model}, and not a {arm}")
 
@@ -107,17 +108,18 @@ class ZenohTransport:
         except TimeoutError:
             raise ConnectFailed(f"{where} does not let this program in: {refusal}") from None
 
-        if self._server not in self._servers:
+        if self._only(self._servers) != server:
             raise ConnectFailed(f"{where} has just gone")
 
+        self._server = server
+        way = self._session.way(f"{self._link}/up", waits=True)
+        self._up = Outbox(way, lambda why: self._break(ConnectionResetError(why)), self._name)
+
     async def send(self, data: bytes) -> None:
-        """Sends one message. It is handed to Zenoh, whose queue holds far more than a link has under way."""
+        """Sends bytes, which wait here while the network cannot take them: far more than a link has under way."""
         self._check()
-        try:
-            self._session.put(f"{self._link}/up", self._up.pack(data), waits=True)
-        except library().ZError as error:
-            self._break(ConnectionResetError(reason(error)))
-            self._check()
+        assert self._up
+        self._up.send(data)
 
     async def receive(self) -> bytes:
         """Returns the bytes of the next message."""
@@ -126,7 +128,9 @@ class ZenohTransport:
             if not self._arrived or self._closing:
                 self._check()
 
-            kind, data = self._unpacked(self._arrived.popleft())
+            message = self._arrived.popleft()
+            self._unread -= len(message)
+            kind, data = self._unpacked(message)
             if kind == END:
                 self._arrived.clear()
                 self._break(ConnectionResetError(data.decode(errors="replace")))
@@ -137,7 +141,11 @@ class ZenohTransport:
         """Closes the session, and with it takes back its token."""
         self._closing = True
         self._news.set()
-        await self._session.aclose()
+        try:
+            if self._up:
+                await self._up.aclose()
+        finally:
+            await self._session.aclose()
 
     def _begin(self, session: zenoh.Session) -> None:
         """Declares what is needed to be let in."""
@@ -179,8 +187,23 @@ class ZenohTransport:
             return END, str(error).encode()
 
     def _hear(self, message: bytes) -> None:
-        self._arrived.append(message)
-        self._news.set()
+        """A message has come; none that comes later counts if one could not be kept."""
+        if self._unread + len(message) > UNREAD:
+            self._break(ConnectionAbortedError(f"this program left {self._unread} bytes unread"))
+        elif not self._broken:
+            self._unread += len(message)
+            self._arrived.append(message)
+            self._news.set()
+
+    def _only(self, servers: set[str]) -> str:
+        """The one that serves the arm; raises ConnectFailed if there are more, or none any more."""
+        if len(servers) > 1:
+            raise ConnectFailed(f"{len(servers)} arms are called {self._name} on Zenoh; rename all but one")
+
+        for server in servers:
+            return server
+
+        raise ConnectFailed(f"zenoh://{self._name} has just gone")
 
     def _notice(self, change: tuple[str, bool]) -> None:
         """A server's token has come or gone."""
@@ -195,6 +218,7 @@ class ZenohTransport:
         self._news.set()
 
     def _break(self, why: Exception) -> None:
+        """It is over; what has arrived before that can still be received."""
         self._broken = self._broken or why
         self._news.set()
 

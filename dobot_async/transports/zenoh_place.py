@@ -21,7 +21,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Place", "address", "library", "reason"]
 
-LEASE, ZENOHS_LEASE = 1500, 10_000  # milliseconds
+GONE = {
+    "transport/unicast/open_timeout": (10_000, 3000),  # milliseconds
+    "transport/link/tx/lease": (10_000, 1500),  # milliseconds
+    "transport/link/tx/queue/congestion_control/block/wait_before_close": (5_000_000, 1_500_000),  # microseconds
+}
+"""After what time somebody who does not answer, says nothing, or reads nothing counts as gone: Zenoh's, and ours."""
 RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 CONFIGURATION = "ZENOH_CONFIG"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
@@ -103,8 +108,9 @@ class Place:
         if not file:
             found |= OWN | self._scope(serving=serving)
 
-        if json.loads(config.get_json("transport/link/tx/lease")) == ZENOHS_LEASE:
-            found["transport/link/tx/lease"] = LEASE
+        for key, (zenohs, ours) in GONE.items():
+            if json.loads(config.get_json(key)) == zenohs:
+                found[key] = ours
 
         given = {"connect/endpoints": self.connect, "listen/endpoints": self.listen}
         return found | {key: list(value) for key, value in given.items() if value}

@@ -1,40 +1,38 @@
-"""What both ends of an arm on Zenoh share: keys, configuration, numbered messages, the way from Zenoh's threads.
+"""What both ends of an arm on Zenoh share: keys, the session, and the way from Zenoh's threads.
 
     dobot/NAME/@arm/MODEL/ID     liveliness: the arm is served by this session
     dobot/NAME/@link/ID          liveliness: a client; a query of this key asks to be let in
-    dobot/NAME/@link/ID/up       what the client sends:   number (8 bytes, big-endian) | kind (1 byte) | bytes
-    dobot/NAME/@link/ID/down     what the arm answers:    the same
+    dobot/NAME/@link/ID/up       what the client sends; see `zenoh_messages`
+    dobot/NAME/@link/ID/down     what the arm answers
     dobot/NAME/pose, ...         readings in JSON, for anybody
 
-A chunk that begins with @ is matched by no wildcard, so `dobot/**` is the readings alone. Zenoh keeps the order of what
-one session sends another, and loses nothing while they are connected; the numbers are there to notice where it does.
+A chunk that begins with @ is matched by no wildcard, so `dobot/**` is the readings alone.
 """
 
 from __future__ import annotations
 
 import asyncio
-import struct
 import threading
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.tasks import whole
+from dobot_async.transports.tasks import whole, within
 from dobot_async.transports.zenoh_place import Place, library, reason
 
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["DATA", "END", "VERSION", "Crossing", "Keys", "Lost", "Numbered", "Session"]
+__all__ = ["VERSION", "Crossing", "Keys", "Session"]
 
 T = TypeVar("T")
 ROOT = "dobot"
 VERSION = 1
-DATA, END = 0, 1
-HEADER = struct.Struct("!QB")
 ALL_ANSWER = 1.0  # seconds
+CLOSED = 3.0  # seconds; Zenoh may take longer, by itself, to give up somebody who does not read
 MOST = 65_536
 """Bytes that may be on their way from Zenoh's threads to the event loop; a peer that sends more is a flood."""
 
@@ -95,21 +93,14 @@ class Session:
         except zenoh.ZError as error:
             raise ConnectFailed(f"Zenoh cannot be started: {reason(error)}") from None
 
-    def put(self, key: str, message: bytes, *, waits: bool) -> None:
-        """Hands a message to Zenoh: reliably, ahead of all else; if its queue is full this waits, or drops it.
+    def way(self, key: str, *, waits: bool) -> Callable[[bytes], None]:
+        """Returns what hands messages to Zenoh, from any thread: reliably, ahead of all else.
 
-        Raises:
-            ZError: It is closed.
+        If Zenoh's queue is full it waits, or drops them. It raises ZError when the session is closed.
         """
         zenoh = library()
-        control = zenoh.CongestionControl
-        self.raw.put(
-            key,
-            message,
-            congestion_control=control.BLOCK if waits else control.DROP,
-            priority=zenoh.Priority.REAL_TIME,
-            express=True,
-        )
+        control = zenoh.CongestionControl.BLOCK if waits else zenoh.CongestionControl.DROP
+        return partial(self.raw.put, key, congestion_control=control, priority=zenoh.Priority.REAL_TIME, express=True)
 
     async def tokens(self, key: str) -> list[str]:
         """Returns the keys of the liveliness tokens that match a key, as far as everybody answers in time."""
@@ -126,46 +117,11 @@ class Session:
 
     async def aclose(self) -> None:
         """Closes it, as far as it is open, and with it takes back its tokens; may be called again."""
+        self.crossing.close()
         session, self._zenoh = self._zenoh, None
         if session:
-            await whole(asyncio.to_thread(session.close))
-
-
-class Lost(Exception):
-    """Messages are missing in front of one that came."""
-
-
-class Numbered:
-    """Numbers the messages of one direction, or takes the numbers off again."""
-
-    def __init__(self) -> None:
-        self._next = 0
-
-    def pack(self, data: bytes, kind: int = DATA) -> bytes:
-        """Returns the next message."""
-        message = HEADER.pack(self._next, kind) + data
-        self._next += 1
-        return message
-
-    def unpack(self, message: bytes) -> tuple[int, bytes] | None:
-        """Returns kind and bytes of a message, None if it came before; an end is an end whatever its number.
-
-        Raises:
-            Lost: Others should have come before it, or it is no message.
-        """
-        if len(message) < HEADER.size:
-            raise Lost("what came is no message")
-
-        number, kind = HEADER.unpack_from(message)
-        if kind != END:
-            if number < self._next:
-                return None
-
-            if number > self._next:
-                raise Lost(f"{number - self._next} messages were lost on the way")
-
-        self._next = number + 1
-        return kind, message[HEADER.size :]
+            with suppress(TimeoutError, library().ZError):
+                await whole(within(CLOSED, asyncio.to_thread(session.close)))
 
 
 class Crossing:
@@ -178,6 +134,11 @@ class Crossing:
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
         self._under_way: Counter[str] = Counter()
+        self._closed = False
+
+    def close(self) -> None:
+        """Lets nothing arrive any more."""
+        self._closed = True
 
     def to(
         self,
@@ -191,6 +152,9 @@ class Crossing:
         """
 
         def called(item: Any) -> None:
+            if self._closed:
+                return
+
             value = read(item)
             sender, weight = weigh(value)
             with self._lock:
@@ -208,6 +172,7 @@ class Crossing:
                 if not self._under_way[sender]:
                     del self._under_way[sender]
 
-            take(value)
+            if not self._closed:
+                take(value)
 
         return library().handlers.Callback(called, indirect=False)

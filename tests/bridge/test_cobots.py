@@ -244,12 +244,6 @@ async def reads(arm: MyCobot) -> None:
 # What cannot be bridged.
 
 
-async def test_an_ultraarm_is_refused_with_the_reason() -> None:
-    with pytest.raises(ValueError, match="do not tell whose they are"):
-        async with bridge("sim:", family="ultraarm"):
-            pass
-
-
 async def test_an_unknown_arm_is_refused_with_the_names() -> None:
     with pytest.raises(ValueError, match="magician, mycobot, "):
         async with bridge("sim:", family="robot"):

@@ -12,18 +12,16 @@ import anyio
 import pytest
 import zenoh
 from bridge_rig import IN_TIME, Plain, Rig, ask, bridged, client, far, until
-from hypothesis import given
-from hypothesis import strategies as st
 from zenoh_rig import configured, connect_to, endpoint, keep, place, session, warm_up, written
 
 from dobot_async import ConnectFailed, ConnectionLost, Magician, discover
-from dobot_async.bridge import bridge
+from dobot_async.bridge import Limits, bridge
 from dobot_async.discovery.zenoh import ZenohArms
 from dobot_async.fleet import Fleet
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import encode
 from dobot_async.transports import open_transport
-from dobot_async.transports.zenoh_session import DATA, END, HEADER, Lost, Numbered
+from dobot_async.transports.zenoh_messages import DATA, END, HEADER
 
 GET_POSE = encode(ask(c.GET_POSE))
 
@@ -83,6 +81,13 @@ async def test_many_reads_at_once_get_their_own_answers() -> None:
         assert {pose.x for pose in poses} == {poses[0].x}
         assert {info.name for info in infos} == {"Dobot Magician"}
         assert arm.link.stats.timeouts == arm.link.stats.unexpected == 0
+
+
+async def test_a_burst_of_answers_arrives_whole() -> None:
+    burst = 1000
+    async with bridged(place(), limits=Limits(frames=1e6, data=1e7)) as rig, client(rig.url) as plain:
+        await plain.send(*[ask(c.GET_POSE)] * burst)
+        assert [(await plain.receive()).id for _ in range(burst)] == [c.GET_POSE.id] * burst
 
 
 async def test_a_router_passes_everything_on() -> None:
@@ -205,30 +210,6 @@ async def test_a_connection_that_is_cancelled_while_it_opens_leaves_nothing() ->
 # --- messages ---
 
 
-@given(st.lists(st.binary(max_size=8), min_size=1), st.data())
-def test_messages_come_in_order_once_or_not_at_all(sent: list[bytes], data: st.DataObject) -> None:
-    sender, receiver = Numbered(), Numbered()
-    line = list(enumerate(map(sender.pack, sent)))
-    spoilt = data.draw(st.lists(st.sampled_from(line), max_size=2 * len(line)))
-    taken = []
-    try:
-        for _, message in spoilt:
-            found = receiver.unpack(message)
-            if found:
-                taken.append(found[1])
-    except Lost:
-        pass
-
-    assert taken == sent[: len(taken)]
-
-
-def test_an_end_is_an_end_whatever_its_number() -> None:
-    assert Numbered().unpack(HEADER.pack(77, END) + b"why") == (END, b"why")
-    assert Numbered().unpack(HEADER.pack(0, DATA) + b"x") == (DATA, b"x")
-    with pytest.raises(Lost):
-        Numbered().unpack(b"short")
-
-
 class Stranger:
     """A client that speaks Zenoh alone, and makes mistakes."""
 
@@ -333,6 +314,65 @@ async def test_a_server_that_loses_an_answer_is_not_believed() -> None:
         assert "1 messages were lost" in str(broken.value.__cause__)
         await transport.aclose()
         withdraw(token)
+
+
+async def test_who_receives_nothing_is_told_so_and_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dobot_async.transports.zenoh.UNREAD", 1000)
+    async with bridged(place()) as rig:
+        transport = await open_transport(rig.url, arm="magician")
+        with pytest.raises(anyio.BrokenResourceError) as broken:
+            while True:
+                await transport.send(GET_POSE)
+                await asyncio.sleep(0.001)
+
+        assert "unread" in str(broken.value.__cause__)
+        received = 0
+        with pytest.raises(anyio.BrokenResourceError):
+            while True:
+                received += len(await transport.receive())
+
+        assert 0 < received <= 1000
+        await transport.aclose()
+
+
+async def test_an_introduction_that_is_a_bomb_is_none() -> None:
+    async with bridged(place()) as rig, session(rig.url) as own:
+        stranger = Stranger(own)
+        token = own.liveliness().declare_token(stranger.link)
+        for bomb in (b"[" * 1000, b"[" * 100_000, b'{"version": 1, "who": "%s"}' % (b"x" * 2000)):
+            assert "speaks version 1" in await stranger.enter(bomb)
+
+        assert await stranger.enter() == ""
+        withdraw(token)
+
+
+async def test_who_is_no_client_is_not_answered_without_end() -> None:
+    async with bridged(place()) as rig, session(rig.url) as own, Magician.connect(rig.url) as mover:
+        stranger = Stranger(own)
+        for number in range(2000):
+            stranger.send(number, GET_POSE)
+
+        await until(lambda: stranger.heard)
+        await mover.move_to(220, 0, 40)
+        assert len(stranger.heard) < 1000
+
+
+async def test_a_server_that_goes_while_it_lets_somebody_in_has_just_gone() -> None:
+    where = endpoint()
+    async with session(listen__endpoints=[where]) as server:
+        token = server.liveliness().declare_token(f"dobot/left/@arm/magician/{server.zid()}")
+
+        def admit(query: zenoh.Query) -> None:
+            withdraw(token)
+            query.reply(query.key_expr, b"")
+
+        server.declare_queryable("dobot/left/@link/*", zenoh.handlers.Callback(admit, indirect=False))
+        with pytest.raises((ConnectFailed, anyio.BrokenResourceError), match=r"just gone|^$"):
+            transport = await open_transport(f"zenoh://left?connect={where}", arm="magician")
+            try:
+                await transport.receive()
+            finally:
+                await transport.aclose()
 
 
 # --- names ---

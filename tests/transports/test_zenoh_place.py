@@ -12,7 +12,7 @@ import pytest
 
 from dobot_async import ConnectFailed
 from dobot_async.transports import open_transport
-from dobot_async.transports.zenoh_place import Place, address
+from dobot_async.transports.zenoh_place import GONE, Place, address
 
 LEASE = "transport/link/tx/lease"
 
@@ -70,3 +70,10 @@ async def test_without_the_package_the_message_says_what_to_install(monkeypatch:
     monkeypatch.setitem(sys.modules, "zenoh", None)
     with pytest.raises(ConnectFailed, match=r"pip install 'dobot-async\[zenoh\]'"):
         await open_transport("zenoh://left", arm="magician")
+
+
+def test_who_is_gone_is_noticed_soon_unless_a_file_says_otherwise(tmp_path: Path) -> None:
+    file = tmp_path / "slow.json5"
+    file.write_text(json.dumps({"transport": {"unicast": {"open_timeout": 7000}}}))
+    found = Place.of(urlsplit(f"zenoh://left?config={file}"), serving=False).configuration(serving=False)
+    assert [json.loads(found.get_json(key)) for key in GONE] == [7000, 1500, 1_500_000]

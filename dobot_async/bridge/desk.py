@@ -1,0 +1,57 @@
+"""Where the requests of a bridge's clients are taken, and what is said of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+
+from dobot_async.bridged import Kind
+from dobot_async.contract import Frame
+
+if TYPE_CHECKING:
+    from dobot_async.bridge.client import Client
+
+__all__ = ["Desk", "Refused", "Request"]
+
+F = TypeVar("F", bound=Frame)
+
+
+class Refused(Exception):
+    """A request is not passed on; the message says why. The client hears it where its protocol has a word for it."""
+
+
+@dataclass(slots=True)
+class Request(Generic[F]):
+    """A request.
+
+    Attributes:
+        frame: As it came.
+        kind: What it is to a bridge.
+        stops: How many stops there had been when it came.
+        times: How often it came before it was sent.
+        ahead: Whether it went ahead of what its client had sent before.
+        answer: What the client is told, None until that is known.
+    """
+
+    frame: F
+    kind: Kind
+    stops: int
+    times: int = 1
+    ahead: bool = False
+    answer: bytes | None = None
+
+
+class Desk(Protocol[F]):
+    """Where requests are taken."""
+
+    stops: int
+    """How often something stopped the arm; what came before the last time is not sent any more."""
+
+    async def answer(self, client: Client[F], request: Request[F]) -> F | None:
+        """Returns the arm's reply, None where the arm need not answer; raises Refused, or DobotError."""
+
+    def refused(self, client: Client[F], name: str, reason: str) -> None:
+        """Takes note that a request was not passed on."""
+
+    def cut(self, client: Client[F], reason: str) -> None:
+        """Ends a connection."""

@@ -1,0 +1,64 @@
+"""The line to the arm as a bridge uses it: frames with their answers, and stops that are said until they are heard."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Generic, TypeVar
+
+from dobot_async.bridged import Bridged
+from dobot_async.contract import Frame
+from dobot_async.errors import ConnectionLost
+from dobot_async.link import Link
+
+__all__ = ["Line"]
+
+F = TypeVar("F", bound=Frame)
+STOPPED_WITHIN = 1.0  # seconds until what stops the arm is said again
+
+
+class Line(Generic[F]):
+    """Frames of a family, by way of a link."""
+
+    def __init__(self, link: Link[F], family: Bridged[F]) -> None:
+        self._link = link
+        self._family = family
+
+    async def ask(self, frame: F, *, ready: Callable[[], None] = lambda: None, urgent: bool = False) -> F:
+        """Sends a frame as often, and waits for its reply as long, as the family says; raises DobotError without one.
+
+        `ready` is called when it is about to be sent; what that raises is raised, and nothing sent.
+        """
+        family = self._family
+        return await self._link.forward(
+            frame,
+            partial(family.accept, frame),
+            name=family.name(frame),
+            timeout=family.patience(frame),
+            repeatable=family.repeatable(frame),
+            urgent=urgent,
+            ready=ready,
+        )
+
+    async def stop(self, frames: Sequence[F]) -> bool:
+        """Says what stops the arm ahead of everything, for a second; returns whether the first of it was answered.
+
+        It waits until the arm can be reached. Raises ConnectionLost if that is over.
+        """
+        await self._link.opened()
+        first, *_ = await asyncio.gather(*map(self._urge, frames), return_exceptions=True)
+        if isinstance(first, ConnectionLost):
+            raise first
+
+        return not isinstance(first, BaseException)
+
+    async def _urge(self, frame: F) -> F:
+        return await self._link.forward(
+            frame,
+            partial(self._family.accept, frame),
+            name=self._family.name(frame),
+            timeout=STOPPED_WITHIN,
+            repeatable=True,
+            urgent=True,
+        )
