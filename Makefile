@@ -2,7 +2,7 @@
 # make test      ruff, mypy and the whole test suite
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make format    what ruff can mend
-# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0]
+# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell]
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 
 PYTHON ?= python3
@@ -41,9 +41,10 @@ pytest: $(VENV)/.dev
 
 SEEDS ?= 10000
 FIRST ?= 0
+OF ?= arm
 
 soak: $(VENV)/.dev
-	$(BIN)/python tests/simulation/soak.py --seeds $(SEEDS) --first $(FIRST)
+	$(BIN)/python tests/simulation/soak.py --of $(OF) --seeds $(SEEDS) --first $(FIRST)
 
 # Guided by coverage if the extra `fuzz` (atheris) is installed.
 SECONDS ?= 60

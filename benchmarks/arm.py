@@ -4,7 +4,9 @@
 
 The first line that it prints is a JSON list of URLs. Then each line that it reads is a question, answered with a line
 of JSON: `counters`, and `executed`: [name, started, finished] of each command that took its time, in seconds of
-`time.monotonic`, which on one computer is the same in all processes. It ends with its input.
+`time.monotonic`, which on one computer is the same in all processes; `each` is `executed` of every arm, and `heard`
+tells of every arm when the bytes that the argument `hears` names had come to its end of the line. It ends with its
+input.
 
 Its loop waits with `select`, whose timers are exact to some hundredth of a millisecond where epoll's are to a whole
 one: the lines of the arms are as slow as they should be, and not slower.
@@ -14,19 +16,24 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import selectors
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import AsyncExitStack, contextmanager
-from dataclasses import asdict
+from collections.abc import Callable, Iterator
+from contextlib import AsyncExitStack, ExitStack, contextmanager
+from dataclasses import asdict, dataclass
 from typing import Any
+
+from report import BAUD, BITS
 
 from dobot_async.mycobot import commands as cobot
 from dobot_async.simulator import MyCobotQuirks, Simulation, simulate
+from dobot_async.transports.baud import AtBaud, Wired
+from dobot_async.transports.terminal import on_pty
 
-__all__ = ["AT_ONCE", "Arms", "arms"]
+__all__ = ["AT_ONCE", "Arms", "arms", "crowd"]
 
 AT_ONCE = 1e6
 """The speed of an arm that executes at once."""
@@ -64,6 +71,17 @@ class Arms:
         """What the first arm has executed: the name, and when it began and ended, by `time.monotonic`."""
         return [(name, started, finished) for name, started, finished in self._ask("executed")]
 
+    @property
+    def each(self) -> list[list[tuple[str, float, float]]]:
+        """`executed` of every arm."""
+        return [[(name, started, finished) for name, started, finished in arm] for arm in self._ask("each")]
+
+    @property
+    def heard(self) -> list[list[float]]:
+        """When what the arms listen for had come to the end of each one's line."""
+        told: list[list[float]] = self._ask("heard")
+        return told
+
     def ended(self, name: str) -> list[float]:
         """When each command of a name had ended."""
         return [finished for each, _, finished in self.executed if each == name]
@@ -83,10 +101,73 @@ class Arms:
         return json.loads(line)
 
 
+class Ear:
+    """A host behind serial lines; notes when some bytes have come in.
+
+    It notes when they are through the line, not when the simulator, which has many arms to attend to, gets to them.
+
+    Args:
+        host: Who is reached.
+        baud: Of its lines.
+        hears: The bytes.
+        came: Returns when they had come at the latest.
+    """
+
+    def __init__(self, host: Simulation, baud: int, hears: bytes, came: Callable[[], float]) -> None:
+        self._came = came
+        self.heard: list[float] = []
+        self._lines = AtBaud(host, baud)
+        self._takes = len(hears) * BITS / baud
+        self._hears = hears
+
+    def client(self, *arguments: Any, **details: Any) -> Listener:
+        """Somebody has connected; see `Host`."""
+        return Listener(self._lines.client(*arguments, **details), self._note)
+
+    def leave(self, client: Listener) -> None:
+        """A client has gone."""
+        self._lines.leave(client.line)
+
+    def _note(self, data: bytes) -> None:
+        if self._hears in data:
+            self.heard.append(self._came() + self._takes)
+
+
+class Woken(selectors.SelectSelector):
+    """Knows since when what it has found is there.
+
+    Attributes:
+        at: When it last woke up, in seconds of `time.monotonic`.
+    """
+
+    at = 0.0
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        """Waits until something is ready."""
+        found = super().select(timeout)
+        self.at = time.monotonic()
+        return found
+
+
+@dataclass
+class Listener:
+    """A client of an `Ear`."""
+
+    line: Wired[Any]
+    note: Callable[[bytes], None]
+
+    def send(self, data: bytes) -> None:
+        """Takes what the client has sent."""
+        self.note(data)
+        self.line.send(data)
+
+
 @contextmanager
-def arms(listen: str, *, model: str = "magician", speed: float = 1.0, count: int = 1) -> Iterator[Arms]:
-    """Runs simulated arms for the length of a block."""
-    details = json.dumps({"listen": listen, "model": model, "speed": speed, "count": count})
+def arms(
+    listen: str, *, model: str = "magician", speed: float = 1.0, count: int = 1, hears: bytes = b""
+) -> Iterator[Arms]:
+    """Runs simulated arms for the length of a block; with `hears` behind lines of 115200 baud, whatever `listen` is."""
+    details = json.dumps({"listen": listen, "model": model, "speed": speed, "count": count, "hears": hears.hex()})
     command = [sys.executable, __file__, details]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         try:
@@ -96,27 +177,60 @@ def arms(listen: str, *, model: str = "magician", speed: float = 1.0, count: int
             process.stdin.close()
 
 
-async def serve(*, listen: str, model: str, speed: float, count: int) -> None:
+@dataclass
+class Served:
+    """The arms of this process.
+
+    Attributes:
+        simulations: The arms.
+        ears: Their lines, if they listen for something.
+        speed: Of their clocks.
+    """
+
+    simulations: list[Simulation]
+    ears: list[Ear]
+    speed: float
+
+
+@contextmanager
+def crowd(listen: str, count: int, **details: Any) -> Iterator[list[Arms]]:
+    """Runs so many arms, in as many processes as there are processors beside that of who is measured; see `arms`."""
+    processes = min(count, max(1, (os.cpu_count() or 1) - 1))
+    with ExitStack() as stack:
+        shares = [count // processes + (number < count % processes) for number in range(processes)]
+        yield [stack.enter_context(arms(listen, count=share, **details)) for share in shares]
+
+
+async def serve(selector: Woken, *, listen: str, model: str, speed: float, count: int, hears: str) -> None:
     """Runs the arms until the input ends."""
     loop = asyncio.get_running_loop()
     async with AsyncExitStack() as stack:
         simulations = [
             await stack.enter_async_context(
-                simulate(model, listen=listen, clock=lambda: time.monotonic() * speed, **QUIRKS.get(model, {}))
+                simulate(
+                    model,
+                    listen="memory" if hears else listen,
+                    clock=lambda: time.monotonic() * speed,
+                    **QUIRKS.get(model, {}),
+                )
             )
             for _ in range(count)
         ]
-        print(json.dumps([simulation.url for simulation in simulations]), flush=True)
+        heard = bytes.fromhex(hears)
+        ears = [Ear(simulation, BAUD, heard, lambda: selector.at) for simulation in simulations if heard]
+        urls = [await on_pty(ear, stack) for ear in ears] or [simulation.url for simulation in simulations]
+        print(json.dumps(urls), flush=True)
+        served = Served(simulations, ears, speed)
         questions = asyncio.StreamReader()
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(questions), sys.stdin)
         while line := (await questions.readline()).decode().strip():
-            print(json.dumps(ANSWERS[line](simulations, speed)), flush=True)
+            print(json.dumps(ANSWERS[line](served)), flush=True)
 
 
-def counters(simulations: list[Simulation], _: float) -> dict[str, int]:
+def counters(served: Served) -> dict[str, int]:
     """All arms' counters, added up."""
     total: dict[str, int] = {}
-    for simulation in simulations:
+    for simulation in served.simulations:
         figures = simulation.arm.counters
         for name, figure in asdict(figures).items():
             total[name] = total.get(name, 0) + int(figure)
@@ -124,18 +238,32 @@ def counters(simulations: list[Simulation], _: float) -> dict[str, int]:
     return total
 
 
-def executed(simulations: list[Simulation], speed: float) -> list[tuple[str, float, float]]:
+def executed(served: Served) -> list[tuple[str, float, float]]:
     """What the first arm has executed."""
-    return [(each.name, each.started / speed, each.finished / speed) for each in simulations[0].arm.executed]
+    return each(served)[0]
 
 
-ANSWERS = {"counters": counters, "executed": executed}
+def each(served: Served) -> list[list[tuple[str, float, float]]]:
+    """What every arm has executed."""
+    return [
+        [(done.name, done.started / served.speed, done.finished / served.speed) for done in simulation.arm.executed]
+        for simulation in served.simulations
+    ]
+
+
+def heard(served: Served) -> list[list[float]]:
+    """When what they listen for had come in on each line."""
+    return [ear.heard for ear in served.ears]
+
+
+ANSWERS = {"counters": counters, "executed": executed, "each": each, "heard": heard}
 
 
 def main() -> None:
     """Runs what the first argument says."""
-    with asyncio.Runner(loop_factory=lambda: asyncio.SelectorEventLoop(selectors.SelectSelector())) as runner:
-        runner.run(serve(**json.loads(sys.argv[1])))
+    selector = Woken()
+    with asyncio.Runner(loop_factory=lambda: asyncio.SelectorEventLoop(selector)) as runner:
+        runner.run(serve(selector, **json.loads(sys.argv[1])))
 
 
 if __name__ == "__main__":

@@ -227,10 +227,7 @@ async def observe(cell: Cell, rate: float, count: int | None, show: Callable[[Ma
         told[name] = reading
         first[name].set()
 
-    tasks = [
-        asyncio.create_task(follow(member, 1 / rate, partial(note, name))) for name, member in cell.members.items()
-    ]
-    try:
+    async def watched() -> None:
         for event in first.values():
             await event.wait()
 
@@ -240,6 +237,13 @@ async def observe(cell: Cell, rate: float, count: int | None, show: Callable[[Ma
                 break
 
             await anyio.sleep(1 / rate)
+
+    tasks = [asyncio.create_task(watched())]
+    tasks += [
+        asyncio.create_task(follow(member, 1 / rate, partial(note, name))) for name, member in cell.members.items()
+    ]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
         for task in tasks:
             task.cancel()

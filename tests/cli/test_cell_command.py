@@ -179,6 +179,12 @@ async def test_watch_draws_every_arm(file: Path) -> None:
     assert shown == [["left", "right", "third"]] * 2
 
 
+async def test_watch_says_what_is_wrong_with_an_arm_and_does_not_wait_for_it() -> None:
+    cell = parse_cell('[arms.left]\nurl = "nonsense"\n')
+    with pytest.raises(ValueError, match="no scheme"):
+        await asyncio.wait_for(observe(cell, 50, 1, lambda _: None), 30)
+
+
 CELL_TEXT = CELL.format(left="sim:", right="sim:")
 
 

@@ -1,6 +1,6 @@
 """One seed is one run of a cell: five guarded arms, zones, barriers and faults, on a virtual clock.
 
-    python tests/fleet/scenario_of_a_cell.py FIRST LAST     runs those seeds, and prints which of them fail
+    make soak OF=cell [SEEDS=10000] [FIRST=0]     runs many of them
 
 What must hold in each run: no two tools are ever in one zone, nobody hangs, no zone is held for ever, and all arms
 stand still soon after one has failed.
@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import asyncio
 import signal
-import sys
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import AsyncExitStack, contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from random import Random
 from typing import Any
 
@@ -260,17 +258,3 @@ def run_seed(seed: int, say: Callable[[str], None] = lambda _: None) -> Figures:
 
     with not_for_ever(), asyncio.Runner(loop_factory=async_solipsism.EventLoop) as runner:
         return runner.run(checked())
-
-
-if __name__ == "__main__":
-    warnings.simplefilter("ignore")
-    counts: dict[str, float] = {}
-    for number in range(int(sys.argv[1]), int(sys.argv[2]) + 1):
-        try:
-            for name, figure in asdict(run_seed(number)).items():
-                counts[name] = counts.get(name, 0) + figure
-        except Exception as error:  # noqa: BLE001 - whatever it is, it is this seed's
-            sys.stdout.write(f"seed {number}: {type(error).__name__}: {error}\n")
-            sys.stdout.flush()
-
-    sys.stdout.write(f"done: {counts}\n")

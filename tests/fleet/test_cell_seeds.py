@@ -1,4 +1,4 @@
-"""Some seeds of the cell's scenario; `python tests/fleet/scenario_of_a_cell.py FIRST LAST` runs more."""
+"""Some seeds of the cell's scenario; `make soak OF=cell` runs more."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Runs many seeds, on all cores: `make soak SEEDS=100000`, or one with its trace: `soak.py --seed N --verbose`.
 
-A seed that fails is printed with the command that replays it. `--memory` works in one process for hours of simulated
-time, and prints how much memory it takes.
+`--of cell` takes the scenario of a cell instead of that of one arm. A seed that fails is printed with the command that
+replays it. `--memory` works in one process for hours of simulated time, and prints how much memory it takes.
 """
 
 from __future__ import annotations
@@ -16,16 +16,18 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict
+from functools import partial
+from importlib import import_module
 from itertools import count, islice
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Protocol
 
-from scenario import run_seed
-
 CHUNK = 20
 SHOWN = 10
 PLAIN_INTERVAL = 10.0  # seconds between two lines where there is no terminal
+SCENARIOS = {"arm": "scenario", "cell": "scenario_of_a_cell"}
+FOLDERS = [str(Path(__file__).parents[1] / name) for name in ("simulation", "fleet")]
 Result = tuple[int, str, dict[str, float]]
 
 
@@ -41,33 +43,39 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
-def run(seed: int) -> Result:
+def scenario(of: str) -> Any:
+    """The module whose `run_seed` runs a seed."""
+    sys.path += [folder for folder in FOLDERS if folder not in sys.path]
+    return import_module(SCENARIOS[of])
+
+
+def run(seed: int, of: str) -> Result:
     """Runs a seed; returns why it failed, or an empty text, and its figures."""
     warnings.simplefilter("ignore")
     try:
-        return seed, "", asdict(run_seed(seed))
+        return seed, "", asdict(scenario(of).run_seed(seed))
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # noqa: BLE001 - whatever it is, it is this seed's
         return seed, f"{type(error).__name__}: {error}", {}
 
 
-def results(seeds: range, jobs: int) -> Iterator[Result]:
+def results(seeds: range, jobs: int, of: str) -> Iterator[Result]:
     """Runs seeds in several processes; yields their results in order."""
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), max_tasks_per_child=None) as pool:
         try:
-            yield from pool.map(run, seeds, chunksize=CHUNK)
+            yield from pool.map(partial(run, of=of), seeds, chunksize=CHUNK)
         finally:
             pool.shutdown(cancel_futures=True)
 
 
-def soak(seeds: range, jobs: int, most: int) -> int:
+def soak(seeds: range, jobs: int, most: int, of: str) -> int:
     """Runs seeds; returns the exit code."""
     started = time.monotonic()
     failed = done = 0
     total: dict[str, float] = {}
     with progress(len(seeds)) as advanced:
-        for seed, failure, figures in results(seeds, jobs):
+        for seed, failure, figures in results(seeds, jobs, of):
             done += 1
             for name, number in figures.items():
                 total[name] = total.get(name, 0) + number
@@ -75,7 +83,7 @@ def soak(seeds: range, jobs: int, most: int) -> int:
             if failure:
                 failed += 1
                 if failed <= SHOWN:
-                    say(f"seed {seed}: {failure}\n    {replay(seed)}")
+                    say(f"seed {seed}: {failure}\n    {replay(seed, of)}")
 
             advanced(done, failed)
             if failed >= most:
@@ -89,9 +97,9 @@ def soak(seeds: range, jobs: int, most: int) -> int:
     return 1 if failed else 0
 
 
-def replay(seed: int) -> str:
-    """The command that runs a seed again, with the trace of its frames."""
-    return f"python {os.path.relpath(Path(__file__))} --seed {seed} --verbose"
+def replay(seed: int, of: str) -> str:
+    """The command that runs a seed again, with its trace."""
+    return f"python {os.path.relpath(Path(__file__))} --of {of} --seed {seed} --verbose"
 
 
 @contextmanager
@@ -126,14 +134,14 @@ def progress(seeds: int) -> Iterator[Progress]:
     yield advanced_plainly
 
 
-def memory(hours: float, seeds: Iterable[int]) -> int:
+def memory(hours: float, seeds: Iterable[int], of: str) -> int:
     """Works in one process for so many simulated hours; prints the memory that it takes, about 20 times."""
     simulated, printed = 0.0, 0.0
     step = hours * 3600 / 20
     for number, seed in enumerate(seeds, start=1):
-        _, failure, figures = run(seed)
+        _, failure, figures = run(seed, of)
         if failure:
-            say(f"seed {seed}: {failure}\n    {replay(seed)}")
+            say(f"seed {seed}: {failure}\n    {replay(seed, of)}")
 
         simulated += figures.get("seconds", 0.0)
         if simulated >= printed:
@@ -155,16 +163,17 @@ def resident() -> int:
         return 0
 
 
-def verbose(seed: int) -> int:
+def verbose(seed: int, of: str) -> int:
     """Runs one seed with its trace."""
     warnings.simplefilter("ignore")
-    say(str(run_seed(seed, say)))
+    say(str(scenario(of).run_seed(seed, say)))
     return 0
 
 
 def main(arguments: Any = None) -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description="Deterministic simulation tests, many seeds of them.")
+    parser.add_argument("--of", choices=SCENARIOS, default="arm", help="which scenario")
     parser.add_argument("--seeds", type=int, default=10_000, help="how many")
     parser.add_argument("--first", type=int, default=0, help="the first one")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
@@ -175,14 +184,14 @@ def main(arguments: Any = None) -> int:
     given = parser.parse_args(arguments)
     if given.seed is not None:
         if given.verbose:
-            return verbose(given.seed)
+            return verbose(given.seed, given.of)
 
-        return soak(range(given.seed, given.seed + 1), 1, 1)
+        return soak(range(given.seed, given.seed + 1), 1, 1, given.of)
 
     if given.memory is not None:
-        return memory(given.memory, islice(count(given.first), 10**9))
+        return memory(given.memory, islice(count(given.first), 10**9), given.of)
 
-    return soak(range(given.first, given.first + given.seeds), given.jobs, given.most)
+    return soak(range(given.first, given.first + given.seeds), given.jobs, given.most, given.of)
 
 
 if __name__ == "__main__":

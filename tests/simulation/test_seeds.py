@@ -33,7 +33,7 @@ def test_seeds(first: int) -> None:
         try:
             run_seed(seed)
         except BaseException as error:
-            error.add_note(replay(seed))
+            error.add_note(replay(seed, "arm"))
             raise
 
 
