@@ -24,44 +24,34 @@ HOMES = {
     ),
     "fleet.fleet": ("Fleet",),
     "link": ("Link",),
-    "magician.alarms": ("Alarm",),
-    "magician.arm": ("DeviceInfo", "Jog", "Magician"),
-    "magician.effectors": ("Gripper", "Laser", "Pen", "SuctionCup"),
-    "magician.kinematics": ("JointLimits", "Kinematics", "Unreachable"),
-    "magician.params": (
-        "ColorPort",
-        "EndEffectorParams",
-        "HHTTrigMode",
-        "InfraredPort",
-        "IOFunction",
-        "Pose",
-        "PTPMode",
-        "TriggerADCCondition",
-    ),
     "motion": ("Motion",),
-    "mycobot.alarms": ("CobotAlarm",),
-    "mycobot.arm": ("MyCobot",),
-    "mycobot.models": ("CobotModel",),
-    "mycobot.params": ("Coords", "EndType", "GripperType", "MoveMode", "PinMode", "ReferenceFrame"),
-    "mycobot.readings": ("CobotInfo", "CobotPose"),
     "transports": ("open_transport",),
-    "ultraarm.arm": ("UltraArm", "UltraArmJog"),
-    "ultraarm.params": ("UltraArmAngles", "UltraArmCoords", "UltraArmLimits"),
     "wire": ("Command",),
 }
-"""Where each public name is at home; it is imported when it is first asked for, so that nobody pays for the rest."""
+"""Where each public name is at home, beside those of the families, which say it themselves."""
 
-HOME = {name: module for module, names in HOMES.items() for name in names}
-__all__ = sorted(HOME)  # noqa: PLE0605 - `__init__.pyi` has it for tools
+
+OWN = {name: f"{__name__}.{module}" for module, names in HOMES.items() for name in names}
+
+
+def homes() -> dict[str, str]:
+    """The module of each public name, which is imported when the name is first asked for: nobody pays for the rest."""
+    from dobot_async.families import homes as of_families  # noqa: PLC0415 - for the same reason
+
+    return OWN | of_families()
 
 
 def __getattr__(name: str) -> Any:
-    if name not in HOME:
+    if name == "__all__":
+        return sorted(homes())
+
+    home = OWN.get(name) or (None if name.startswith("_") else homes().get(name))
+    if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
-    value = globals()[name] = getattr(import_module(f"{__name__}.{HOME[name]}"), name)
+    value = globals()[name] = getattr(import_module(home), name)
     return value
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+    return [*globals(), *homes()]

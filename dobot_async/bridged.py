@@ -7,14 +7,15 @@ known of the rest to tell whether the arm moves on behalf of a program that has 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 from dobot_async.contract import Encoder, Frame, Parser
+from dobot_async.link import Link
 from dobot_async.transports import Transport
 
-__all__ = ["Bridged", "Kind", "Reading", "Watch"]
+__all__ = ["Bridged", "ByKey", "Kind", "Reading", "Watch"]
 
 F = TypeVar("F", bound=Frame)
 
@@ -86,8 +87,20 @@ class Bridged(Protocol[F]):
         """Whether an answer to a stop proves that the arm obeys; else it is looked at until it is seen to stand."""
 
     @property
-    def denials(self) -> Mapping[str, Collection[Any]]:
-        """Groups of commands that can be blocked, by name: the keys of their frames."""
+    def insisting(self) -> Sequence[F]:
+        """What is said instead to an arm that has heard `stopping` several times and is still seen to move."""
+
+    @property
+    def in_order(self) -> bool:
+        """Whether nothing but their order tells whose answers are.
+
+        A client then gets its answers in the order of its requests, one for each, and what came behind a request that
+        the arm did not answer is dropped.
+        """
+
+    @property
+    def denials(self) -> Mapping[str, Collection[Hashable]]:
+        """Groups of commands that can be blocked, by name: the subjects of their requests."""
 
     @property
     def readings(self) -> Mapping[str, Reading[F]]:
@@ -101,13 +114,22 @@ class Bridged(Protocol[F]):
         """Opens the way to an arm, with the family's manners; raises ConnectFailed if that takes too long."""
 
     def parser(self) -> Parser[F]:
-        """Returns a parser for one stream."""
+        """Returns a parser for what the arm sends."""
+
+    def requests(self) -> Parser[F]:
+        """Returns a parser for what a client sends."""
+
+    def attach(self, link: Link[F], parser: Parser[F]) -> None:
+        """Called with a new link to the arm, and the parser of what it sends."""
 
     def watch(self) -> Watch[F]:
         """Returns what follows one program."""
 
     def kind(self, request: F) -> Kind:
         """Returns what a request is."""
+
+    def subject(self, request: F) -> Hashable:
+        """Returns what `denials` call a request."""
 
     def name(self, request: F) -> str:
         """Returns what people call a request; nothing of its parameters."""
@@ -126,3 +148,44 @@ class Bridged(Protocol[F]):
 
     def check(self, request: F) -> None:
         """Raises ProtocolError for a frame that the arm could not take."""
+
+    def aside(self, frame: F) -> bool:
+        """Returns whether a frame that nobody waits for is for who moves the arm; else it is late, and for nobody."""
+
+    def refusal(self, reason: str) -> bytes:
+        """Returns what a client is told whose request is not passed on; nothing if the protocol has no word for it."""
+
+
+class ByKey(Generic[F]):
+    """A family whose answers tell by their keys whose they are, and which has no word for a refusal."""
+
+    in_order = False
+    stopping: Sequence[F] = ()
+
+    @property
+    def insisting(self) -> Sequence[F]:
+        """Nothing else than `stopping`."""
+        return self.stopping
+
+    def parser(self) -> Parser[F]:
+        """Returns a parser for one stream."""
+        raise NotImplementedError
+
+    def requests(self) -> Parser[F]:
+        """Returns a parser for what a client sends, which looks like what the arm sends."""
+        return self.parser()
+
+    def attach(self, link: Link[F], parser: Parser[F]) -> None:
+        """The parser needs to know of nothing."""
+
+    def subject(self, request: F) -> Hashable:
+        """Returns the key."""
+        return request.key
+
+    def aside(self, frame: F) -> bool:  # noqa: ARG002 - its key tells that nobody waits for it
+        """Returns False."""
+        return False
+
+    def refusal(self, reason: str) -> bytes:  # noqa: ARG002 - there is no word for it
+        """Returns nothing."""
+        return b""

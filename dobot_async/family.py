@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any, TypeVar
 
@@ -13,10 +13,12 @@ from dobot_async.motion import Motion, MotionQueue, undisturbed
 from dobot_async.transports import Transport, hidden, open_transport
 from dobot_async.wire import Command
 
-__all__ = ["Collector", "collected", "open_in_time", "owned"]
+__all__ = ["Collector", "collected", "held", "left", "open_in_time", "owned"]
 
 Q = TypeVar("Q")
 C = TypeVar("C", bound="Collector")
+Closing = Callable[[], Coroutine[Any, Any, None]]
+LEAST = 1.0  # seconds that an arm has for its first answer, whatever it took to open the way to it
 
 
 async def owned(queue: MotionQueue, command: Command[Q, Any], value: Q, timeout: float | None) -> None:
@@ -83,3 +85,37 @@ async def open_in_time(url: str, arm: str, timeout: float) -> Transport:
         # What the transport was about when the time was over may have left advice.
         why = getattr(error.__cause__, "__notes__", ["is the address right?"])[0]
         raise ConnectFailed(f"{hidden(url)} could not be opened within {timeout:.3g} s; {why}") from None
+
+
+def left(deadline: float, timeout: float) -> float:
+    """Returns the seconds in which an arm has to answer: until the deadline, but some even if the way took them all.
+
+    To open it may take long where the arm is not to blame, as on a busy computer that imports the simulator first.
+    """
+    return max(deadline - asyncio.get_running_loop().time(), min(timeout, LEAST))
+
+
+@asynccontextmanager
+async def held(greet: Awaitable[None], *, leave: Closing | None, close: Closing) -> AsyncIterator[None]:
+    """Holds an arm for the length of a block, and closes its link in any case.
+
+    Args:
+        greet: Proves that the arm answers.
+        leave: Stops the arm where the block is left by an error or a cancellation; None lets it go on.
+        close: Closes the link.
+    """
+    try:
+        await greet
+    except BaseException:
+        await undisturbed(close())
+        raise
+
+    try:
+        yield
+    except BaseException:
+        if leave:
+            await undisturbed(leave())
+
+        raise
+    finally:
+        await undisturbed(close())

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import os
 import shutil
 import subprocess
@@ -23,7 +24,7 @@ from hypothesis import strategies as st
 from virtual import virtual
 
 from dobot_async import ConnectFailed, DeviceInfo, DiscoveryProblem, Found, Magician, discover
-from dobot_async.discovery import SOURCES, Source
+from dobot_async.discovery import SOURCES, Source, wifi
 from dobot_async.discovery.families import FAMILIES, Family
 from dobot_async.discovery.found import natural, printable
 from dobot_async.discovery.serial_ports import SerialPorts
@@ -134,8 +135,14 @@ async def test_a_source_that_hangs_is_ended() -> None:
     sources = [hanging, Listed("whole", [way("serial://COM1")])]
     found = await everything(timeout=3, sources=sources, on_problem=problems.append)
     assert urls(found) == ["udp://10.0.0.1", "serial://COM1"]
-    assert [problem.source for problem in problems] == ["hanging"]
+    assert [(problem.source, problem.message) for problem in problems] == [("hanging", "it did not end within 8 s")]
     assert hanging.ended
+
+
+@pytest.mark.parametrize("times", [{"timeout": math.nan}, {"timeout": -1}, {"probe_timeout": math.nan}])
+async def test_a_time_that_is_none(times: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="seconds, not"):
+        discover(sources=[], **times)
 
 
 async def test_what_the_listener_raises_is_not_swallowed() -> None:
@@ -416,6 +423,18 @@ async def test_arms_in_the_wifi_answer_a_broadcast() -> None:
         assert all(each.description == "USR-C322 2.17.14" for each in found)
         async with Magician.connect(found[0].url, control=False) as arm:
             await arm.get_pose()
+
+
+@linux
+async def test_an_address_that_this_computer_does_not_have_hinders_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with arms(1) as (sims, [(target, port)]):
+        monkeypatch.setattr(wifi, "PORT", port)
+        monkeypatch.setattr(wifi, "ways_out", lambda: [("192.0.2.1", target), ("127.0.0.1", target)])
+        (found,) = await first(WiFiModules())
+        assert f"{found.url}:8899" == sims[0].url
+        monkeypatch.setattr(wifi, "ways_out", lambda: [("192.0.2.1", target)])
+        with pytest.raises(OSError, match="Cannot assign"):
+            await first(WiFiModules())
 
 
 @linux

@@ -14,15 +14,17 @@ from pathlib import Path
 import pytest
 
 import dobot_async
+from dobot_async.families import REGISTERED
 
 PACKAGE = "dobot_async"
 ROOT = Path(dobot_async.__file__).parent
-FAMILIES = ("magician", "mycobot", "ultraarm")
+FAMILIES = tuple(REGISTERED)
 LAYERS = (
-    ("errors",),
+    ("errors", "families"),
     ("wire", "events", "pending", "turns", "roundtrip"),
     ("layouts", "executor", "transports", "contract", "posted"),
-    ("link", "hosted"),
+    ("asking",),
+    ("link", "hosted", "rows"),
     ("motion", "bridged"),
     ("family",),
     FAMILIES,
@@ -98,14 +100,15 @@ def test_the_layers_are_seen_at_all() -> None:
     assert own_imports(ROOT / "magician" / "arm.py") >= {"link", "motion", "magician"}
 
 
-def test_modules_are_named_as_strings_by_the_transports_and_the_package_alone() -> None:
+def test_modules_are_named_as_strings_by_the_transports_the_package_and_the_register_of_families_alone() -> None:
     late = {name_of(path) for path in SOURCES if words(path) & {"import_module", "__import__", "importlib"}}
-    assert late == {"__init__.py", str(Path("transports", "__init__.py"))}
+    assert late == {"__init__.py", "families.py", str(Path("transports", "__init__.py"))}
 
 
 @pytest.mark.parametrize("statement", ["import dobot_async", "from dobot_async import Magician, open_transport"])
 def test_importing_the_package_brings_in_nothing_that_is_not_used_yet(statement: str) -> None:
     late = ["serial", "serial_asyncio", "bleak", "zenoh", "click", "rich", "dobot_async.simulator", "dobot_async.cli"]
+    late += [f"dobot_async.{family}.commands" for family in FAMILIES] if statement == "import dobot_async" else []
     program = f"{statement}\nimport sys\nprint([name for name in {late!r} if name in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
     assert ran.stdout.strip() == "[]"

@@ -49,9 +49,18 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
         raise click.UsageError("a bridge writes no trace: passwords go through it; trace the program that connects")
 
     if token_file:
-        token = token_file.read_text(encoding="utf-8").strip()
+        token = token_in(token_file)
 
     run(serve(session, token=token, **details))
+
+
+def token_in(file: Path) -> str:
+    """Returns the token in a file; raises UsageError if there is none."""
+    token = file.read_bytes().strip()
+    if not token.isascii() or not token:
+        raise click.UsageError(f"{file} has no token: one word of printable ASCII characters")
+
+    return token.decode("ascii")
 
 
 async def serve(session: Session, *, source: str, token: str | None, **details: Any) -> None:

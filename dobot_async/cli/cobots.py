@@ -18,12 +18,11 @@ from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.alarms import CobotAlarm
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.frame import Frame
-from dobot_async.mycobot.models import AXES, MODELS, CobotModel
+from dobot_async.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
 from dobot_async.mycobot.readings import CobotPose
 
 __all__ = ["COBOTS"]
 
-DEFAULT = "mycobot280"
 WAYS = {"to": c.MoveMode.ANGULAR, "linear": c.MoveMode.LINEAR}
 JOINTS = "joints"
 
@@ -97,7 +96,7 @@ async def jog(arm: MyCobot, direction: str, seconds: float) -> None:
     await arm.jog(direction, seconds)
 
 
-async def suction(arm: MyCobot, on: bool) -> None:  # noqa: ARG001
+async def suction(_arm: MyCobot, _on: bool) -> None:
     """There is no pump."""
     raise click.UsageError("this arm has no pump of its own")
 

@@ -20,6 +20,7 @@ import click
 from click.core import ParameterSource
 
 from dobot_async.cli.output import joint_words, tool_words
+from dobot_async.cli.params import ABOVE_ZERO
 from dobot_async.cli.session import Session, run
 from dobot_async.magician.arm import Magician
 from dobot_async.magician.params import Pose, PTPMode
@@ -153,7 +154,7 @@ def ways(cycles: int) -> Iterator[tuple[tuple[float, float], tuple[float, float]
 )
 @click.option(
     "--speed",
-    type=click.FloatRange(0, min_open=True),
+    type=ABOVE_ZERO,
     help=f"Simulated seconds per second.  [default: {SPEED:g}]",
 )
 @click.option("--yes", is_flag=True, help="Do not ask before a real arm moves.")

@@ -3,38 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from ipaddress import IPv4Address
-from typing import Any
 
 import click
 
+from dobot_async.cli.params import ABOVE_ZERO, Place
 from dobot_async.cli.session import Session, run
 from dobot_async.discovery import SOURCES, DiscoveryProblem, Found, Source, discover
 from dobot_async.discovery.found import printable
-from dobot_async.discovery.wifi import PORT, WiFiModules
+from dobot_async.discovery.wifi import WiFiModules
 from dobot_async.discovery.zenoh import ZenohArms
 
-__all__ = ["Place", "broadcast_option", "discover_arms"]
+__all__ = ["broadcast_option", "discover_arms"]
 
 HEADINGS = "URL", "ARM", "WHAT IT SAYS OF ITSELF"
 UNNAMED = "-"
-
-
-class Place(click.ParamType[tuple[str, int]]):
-    """An IPv4 address, with the port where modules are asked unless it has one of its own."""
-
-    name = "address"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, int]:
-        """Reads ADDRESS or ADDRESS:PORT."""
-        if isinstance(value, tuple):
-            return value
-
-        host, _, port = value.partition(":")
-        try:
-            return str(IPv4Address(host)), int(port or PORT)
-        except ValueError:
-            self.fail(f"{value!r} is no IPv4 address such as 192.168.1.255, or 192.168.1.255:{PORT}", param, ctx)
 
 
 def broadcast_option(command: click.decorators.FC) -> click.decorators.FC:
@@ -50,9 +32,7 @@ def broadcast_option(command: click.decorators.FC) -> click.decorators.FC:
 
 
 @click.command("discover")
-@click.option(
-    "--timeout", type=click.FloatRange(0, min_open=True), default=3.0, show_default=True, help="Seconds to listen."
-)
+@click.option("--timeout", type=ABOVE_ZERO, default=3.0, show_default=True, help="Seconds to listen.")
 @click.option("--probe", is_flag=True, help="Connect to each, with reads alone, and ask who it is.")
 @click.option("--source", "names", type=click.Choice(list(SOURCES)), multiple=True, help="Search there only.")
 @broadcast_option

@@ -1,6 +1,6 @@
 """What the commands need to know of each family: how one asks an arm of it, and in which words it answers.
 
-A family is one entry of `FAMILIES`, by its word of `--arm`.
+A family is one entry of `FAMILIES`, by its word of `--arm`; each is imported when it is asked for.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from typing import Any
 
 import click
 
-from dobot_async.cli.cobots import COBOTS
 from dobot_async.cli.family import Family, Reading, Told
 from dobot_async.cli.output import joint_words, tool_words
 from dobot_async.cli.pieces import magician_pieces, ultraarm_pieces
 from dobot_async.cli.trace import described
+from dobot_async.families import Parts
 from dobot_async.magician import commands as magician
 from dobot_async.magician.alarms import Alarm
 from dobot_async.magician.arm import Jog, Magician
@@ -25,7 +25,7 @@ from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
 from dobot_async.ultraarm.frame import Frame as Line
 from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords
 
-__all__ = ["FAMILIES", "MODES", "Family", "Reading", "Told"]
+__all__ = ["FAMILIES", "MAGICIAN", "MODES", "ULTRAARM", "Family", "Reading", "Told"]
 
 NO_INDEX = 1 << 63
 """From here on a Magician's index means that it has none to tell: it has executed nothing yet, or it moves."""
@@ -183,36 +183,37 @@ def described_line(frame: Line, *, outgoing: bool) -> dict[str, Any]:
     }
 
 
-FAMILIES: dict[str, Family] = {
-    "magician": Family(
-        kind=Magician,
-        info=magician_info,
-        pose=magician_pose,
-        read=magician_reading,
-        move=magician_move,
-        modes=("movj", *(each for each in MODES if each != "movj")),
-        jog=Magician.jog,
-        directions=directions(Jog),
-        suction=lambda arm, on: arm.suction(on, pump=on),
-        describe=described,
-        pieces=magician_pieces,
-        alarms=True,
-    ),
-    **COBOTS,
-    "ultraarm": Family(
-        kind=UltraArm,
-        info=ultraarm_info,
-        pose=ultraarm_pose,
-        read=ultraarm_reading,
-        move=ultraarm_move,
-        modes=("to", "by", "joints"),
-        jog=UltraArm.jog,
-        directions=directions(UltraArmJog),
-        suction=UltraArm.suction,
-        describe=described_line,
-        pieces=ultraarm_pieces,
-    ),
-}
+MAGICIAN = Family(
+    kind=Magician,
+    info=magician_info,
+    pose=magician_pose,
+    read=magician_reading,
+    move=magician_move,
+    modes=("movj", *(each for each in MODES if each != "movj")),
+    jog=Magician.jog,
+    directions=directions(Jog),
+    suction=lambda arm, on: arm.suction(on, pump=on),
+    describe=described,
+    pieces=magician_pieces,
+    alarms=True,
+)
+
+ULTRAARM = Family(
+    kind=UltraArm,
+    info=ultraarm_info,
+    pose=ultraarm_pose,
+    read=ultraarm_reading,
+    move=ultraarm_move,
+    modes=("to", "by", "joints"),
+    jog=UltraArm.jog,
+    directions=directions(UltraArmJog),
+    suction=UltraArm.suction,
+    describe=described_line,
+    pieces=ultraarm_pieces,
+)
+
+FAMILIES: Parts[Family] = Parts("cli")
+"""All of them."""
 
 
 def chosen(value: str | None, choices: Sequence[str], what: str) -> str:

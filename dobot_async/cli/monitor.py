@@ -10,13 +10,14 @@ import click
 
 from dobot_async.cli.families import Reading
 from dobot_async.cli.output import Output
+from dobot_async.cli.params import ABOVE_ZERO
 from dobot_async.cli.session import Session, run
 
 __all__ = ["monitor"]
 
 
 @click.command()
-@click.option("--rate", type=click.FloatRange(0, min_open=True), default=5.0, show_default=True, help="Readings/s.")
+@click.option("--rate", type=ABOVE_ZERO, default=5.0, show_default=True, help="Readings/s.")
 @click.option("--count", type=click.IntRange(1), help="End after so many readings.")
 @click.pass_obj
 def monitor(session: Session, rate: float, count: int | None) -> None:

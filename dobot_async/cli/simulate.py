@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from dobot_async.cli.discover import Place
+from dobot_async.cli.params import ABOVE_ZERO, Place
 from dobot_async.cli.session import ARMS, Session, run
 
 __all__ = ["simulate"]
@@ -43,7 +43,7 @@ def faults(command: click.decorators.FC) -> click.decorators.FC:
     metavar="WHERE",
     help="pty, tcp://127.0.0.1:0 or udp://127.0.0.1:0 (port 0 takes a free one), or ble (Linux).",
 )
-@click.option("--speed", type=click.FloatRange(0, min_open=True), default=1.0, help="Simulated seconds per second.")
+@click.option("--speed", type=ABOVE_ZERO, default=1.0, help="Simulated seconds per second.")
 @click.option("--seed", type=int, help="Of the faults, to have the same ones again.")
 @click.option(
     "--announce",

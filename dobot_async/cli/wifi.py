@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import click
 
 from dobot_async.cli.discover import broadcast_option
+from dobot_async.cli.params import ABOVE_ZERO
 from dobot_async.cli.session import Session, run
 from dobot_async.discovery.families import probe_magician
 from dobot_async.discovery.found import Found
@@ -47,16 +48,8 @@ class Joined:
 @click.option("--netmask", default="255.255.255.0", show_default=True, help="Of the network; with --address.")
 @click.option("--gateway", help="The router; with --address.")
 @click.option("--dns", help="The name server; with --address.")
-@click.option(
-    "--timeout", type=click.FloatRange(0, min_open=True), default=30.0, show_default=True, help="Seconds to join."
-)
-@click.option(
-    "--search",
-    type=click.FloatRange(0, min_open=True),
-    default=10.0,
-    show_default=True,
-    help="Seconds to search for the arm then.",
-)
+@click.option("--timeout", type=ABOVE_ZERO, default=30.0, show_default=True, help="Seconds to join.")
+@click.option("--search", type=ABOVE_ZERO, default=10.0, show_default=True, help="Seconds to search for the arm then.")
 @broadcast_option
 @click.pass_obj
 def set_up_wifi(
@@ -103,7 +96,11 @@ def read_password(ssid: str) -> str:
         answer: str = click.prompt(f"Password of {ssid}", hide_input=True, err=True)
         return answer
 
-    line = sys.stdin.readline() if sys.stdin is not None else ""
+    try:
+        line = sys.stdin.readline() if sys.stdin is not None else ""
+    except UnicodeDecodeError:
+        raise click.UsageError(f"the password on standard input is no {sys.stdin.encoding} text") from None
+
     if not line.strip("\r\n"):
         raise click.UsageError("standard input has no password on its first line; --open is for networks without one")
 

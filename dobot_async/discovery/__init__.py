@@ -44,7 +44,7 @@ def discover(
     sources: Iterable[str | Source] = tuple(SOURCES),
     probe: bool = False,
     probe_timeout: float = 10.0,
-    families: Sequence[Family] = FAMILIES,
+    families: Iterable[Family] = FAMILIES,
     on_problem: Callable[[DiscoveryProblem], None] | None = None,
 ) -> AsyncGenerator[Found, None]:
     """Searches for arms, and yields each once.
@@ -62,8 +62,12 @@ def discover(
         on_problem: Called with each source that fails; by default that is logged as a warning.
 
     Raises:
-        ValueError: There is no source of that name.
+        ValueError: There is no source of that name, or a time is no number.
     """
+    for seconds in (timeout, probe_timeout):
+        if not seconds >= 0:
+            raise ValueError(f"a search and a probe take seconds, not {seconds!r}")
+
     chosen = [named(source) if isinstance(source, str) else source for source in sources]
     search = partial(collected, timeout=timeout, tell=on_problem or log)
     if not probe:
@@ -91,8 +95,7 @@ async def in_order(searches: Sequence[Callable[[], Awaitable[list[Found]]]]) -> 
         for task in tasks:
             task.cancel()
 
-        if tasks:
-            await asyncio.wait(tasks)
+        await asyncio.gather(*tasks, return_exceptions=True)
 
 
 async def merged(searches: Sequence[Callable[[], Awaitable[list[Found]]]]) -> AsyncGenerator[Found, None]:
@@ -126,18 +129,20 @@ def same_arm(arm: Found, other: Found) -> bool:
 async def collected(source: Source, *, timeout: float, tell: Callable[[DiscoveryProblem], None]) -> list[Found]:
     """Returns what a source has found, sorted, when it has ended; tells what went wrong."""
     found: dict[str, Found] = {}
+    limit = asyncio.timeout(timeout + PATIENCE)
     try:
-        async with asyncio.timeout(timeout + PATIENCE), aclosing(source.search(timeout)) as search:
+        async with limit, aclosing(source.search(timeout)) as search:
             async for each in search:
                 found[each.identity] = each
     except Exception as error:  # noqa: BLE001 - whatever breaks a source, the others go on
-        tell(DiscoveryProblem(source.name, " ".join(str(error).split()) or type(error).__name__, error))
+        message = f"it did not end within {timeout + PATIENCE:g} s" if limit.expired() else one_line(error)
+        tell(DiscoveryProblem(source.name, message, error))
 
     return sorted(found.values(), key=lambda each: natural(each.url))
 
 
 async def probed(
-    source: Source, search: Callable[[Source], Awaitable[list[Found]]], families: Sequence[Family], timeout: float
+    source: Source, search: Callable[[Source], Awaitable[list[Found]]], families: Iterable[Family], timeout: float
 ) -> list[Found]:
     """Returns what a source has found, with what each arm says of itself."""
     turns = asyncio.Semaphore(source.probes_at_once)
@@ -149,7 +154,7 @@ async def probed(
     return await asyncio.gather(*map(ask, await search(source)))
 
 
-async def asked(found: Found, families: Sequence[Family], timeout: float) -> Found:
+async def asked(found: Found, families: Iterable[Family], timeout: float) -> Found:
     """Asks what was found who it is: as each family that it can be, until it answers."""
     problems = []
     for family in families:
@@ -158,9 +163,14 @@ async def asked(found: Found, families: Sequence[Family], timeout: float) -> Fou
                 info = await family.probe(found.url, timeout)
                 return replace(found, families=(family.name,), info=info)
             except (DobotError, OSError, ValueError) as error:
-                problems.append(" ".join(str(error).split()) or type(error).__name__)
+                problems.append(one_line(error))
 
     return replace(found, problem="; ".join(problems) or "it is of a family that cannot be asked who it is")
+
+
+def one_line(error: Exception) -> str:
+    """What an error says, on one line."""
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def log(problem: DiscoveryProblem) -> None:

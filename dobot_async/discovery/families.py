@@ -11,11 +11,12 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from dobot_async.errors import CommandRejected, ConnectFailed
+from dobot_async.families import Each
 from dobot_async.magician.arm import DeviceInfo, Magician
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.ultraarm.arm import UltraArm
 
-__all__ = ["CH340", "CH9102", "CP210X", "FAMILIES", "Family"]
+__all__ = ["CH340", "CH9102", "CP210X", "FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "Family"]
 
 CP210X = 0x10C4, 0xEA60
 CH340 = 0x1A86, 0x7523
@@ -79,9 +80,8 @@ async def probe_ultraarm(url: str, timeout: float) -> DeviceInfo:
     return DeviceInfo(serial_number="", name="", version=version)
 
 
-FAMILIES = (
-    Family("magician", frozenset({CP210X, CH340, CH9102}), probe_magician),
-    Family("mycobot", frozenset({CP210X, CH9102}), probe_mycobot),
-    Family("ultraarm", frozenset({CH340}), probe_ultraarm),
-)
+MAGICIAN = Family("magician", frozenset({CP210X, CH340, CH9102}), probe_magician)
+MYCOBOT = Family("mycobot", frozenset({CP210X, CH9102}), probe_mycobot)
+ULTRAARM = Family("ultraarm", frozenset({CH340}), probe_ultraarm)
+FAMILIES: Each[Family] = Each("discovery")
 """In the order in which they are tried."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
+from collections.abc import AsyncGenerator, Callable, Iterable
 from typing import Protocol
 
 from anyio import to_thread
@@ -35,7 +35,7 @@ class SerialPorts:
     probes_at_once = 8
 
     def __init__(
-        self, families: Sequence[Family] = FAMILIES, ports: Callable[[], Iterable[Port]] | None = None
+        self, families: Iterable[Family] = FAMILIES, ports: Callable[[], Iterable[Port]] | None = None
     ) -> None:
         self._families = families
         self._ports = ports or list_ports

@@ -54,11 +54,20 @@ class WiFiModules:
         end = asyncio.get_running_loop().time() + timeout
         async with AsyncExitStack() as stack:
             ear = Ear()
-            mouths = {own: await ear.open(own, stack) for own in dict(ways)}
+            mouths, refused = [], []
+            for own, target in ways:
+                try:
+                    mouths.append((await ear.open(own, stack), target))
+                except OSError as error:  # a computer's name may lead to addresses that it does not have
+                    refused.append(error)
+
+            if not mouths:
+                raise refused[-1]
+
             until = 0.0
             while until < end:
-                for own, target in ways:
-                    mouths[own].sendto(QUESTION, target)
+                for mouth, target in mouths:
+                    mouth.sendto(QUESTION, target)
 
                 until = min(asyncio.get_running_loop().time() + self._interval, end)
                 while found := await ear.next(until):

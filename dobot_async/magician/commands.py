@@ -19,10 +19,10 @@ from typing import Annotated, Any, TypeVar
 from dobot_async.layouts import NOTHING, Bytes, Count, Lenient, Text
 from dobot_async.magician.frame import MAX_PARAMS
 from dobot_async.magician.params import *
+from dobot_async.rows import Rows
 from dobot_async.wire import Command, Layout, Number, Queueing, Record, Scalar, f32, flag, u8, u32, u32x3, u64
 
 Q = TypeVar("Q")
-R = TypeVar("R")
 
 SERIAL_NUMBER = Text(MAX_PARAMS - 1, "latin-1")
 DEVICE_NAME = Text(MAX_PARAMS - 1)
@@ -41,62 +41,13 @@ ALLOWED, ALWAYS = Queueing.ALLOWED, Queueing.ALWAYS
 FLASH = 3.0  # seconds that an arm may take to answer a command that it keeps beyond its power-off
 
 
-def read(name: str, number: int, reply: type[R] | Layout[R], section: str) -> Command[None, R]:
-    """A row that asks for something, with no parameters."""
-    return Command(name, number, NOTHING, layout(reply), section)
-
-
-def ask(
-    name: str,
-    number: int,
-    request: type[Q] | Layout[Q],
-    reply: type[R] | Layout[R],
-    section: str,
-    echo: str | None = None,
-) -> Command[Q, R]:
-    """A row that asks for something that the request names."""
-    return Command(name, number, layout(request), layout(reply), section, echo=echo)
-
-
-def write(
-    name: str,
-    number: int,
-    request: type[Q] | Layout[Q],
-    section: str,
-    queueing: Queueing = Queueing.NEVER,
-    *,
-    repeatable: bool = True,
-    timeout: float = 1.5,
-    moves: bool = False,
-) -> Command[Q, None]:
-    """A row that sets something; the arm answers with nothing, or with the index if it was queued."""
-    return Command(
-        name,
-        number,
-        layout(request),
-        NOTHING,
-        section,
-        write=True,
-        queueing=queueing,
-        repeatable=repeatable,
-        timeout=timeout,
-        moves=moves,
-    )
+ROWS = Rows(Record, NOTHING)
+read, ask, write, motion = ROWS.read, ROWS.ask, ROWS.write, ROWS.motion
 
 
 def queued(name: str, number: int, request: type[Q] | Layout[Q], section: str) -> Command[Q, None]:
     """A row whose work takes its time in the queue; to send it twice is to do it twice."""
     return write(name, number, request, section, ALWAYS, repeatable=False)
-
-
-def motion(name: str, number: int, request: type[Q] | Layout[Q], section: str) -> Command[Q, None]:
-    """A row that moves the arm, in the queue."""
-    return write(name, number, request, section, ALWAYS, repeatable=False, moves=True)
-
-
-def layout(kind: type[Q] | Layout[Q]) -> Layout[Q]:
-    """The layout itself, or that of a dataclass."""
-    return Record(kind) if isinstance(kind, type) else kind
 
 
 # 2.3 Device information

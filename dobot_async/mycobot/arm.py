@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import anyio
 
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTimeout
-from dobot_async.family import open_in_time, owned
+from dobot_async.family import held, left, open_in_time, owned
 from dobot_async.hosted import HostedExecutor
 from dobot_async.link import Link
 from dobot_async.motion import undisturbed
@@ -22,7 +22,7 @@ from dobot_async.mycobot import commands as c
 from dobot_async.mycobot import frame
 from dobot_async.mycobot.channel import Channel
 from dobot_async.mycobot.executor import CobotHand, Tolerance
-from dobot_async.mycobot.models import AXES, CobotModel, model_of
+from dobot_async.mycobot.models import AXES, DEFAULT, CobotModel, model_of
 from dobot_async.mycobot.queue import CobotQueue
 from dobot_async.mycobot.readings import Readings
 from dobot_async.mycobot.verbs import SPEED, Verbs
@@ -70,7 +70,7 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
         cls,
         url: str,
         *,
-        model: str = "mycobot280",
+        model: str = DEFAULT,
         control: bool = True,
         queue: Literal["fresh", "keep"] = "fresh",
         timeout: float = 5.0,
@@ -112,8 +112,7 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
 
         floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
         reopen = partial(opened, with_baud(url, arm_model.baud), model, timeout, gap)
-        loop = asyncio.get_running_loop()
-        deadline = loop.time() + timeout
+        deadline = asyncio.get_running_loop().time() + timeout
         link = Link(
             await reopen(),
             frame.Parser(arm_model.known),
@@ -126,22 +125,11 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
         )
         acknowledges = arm_model.acknowledges if acknowledges is None else acknowledges
         arm = cls(link, model=arm_model, acknowledges=acknowledges, tolerance=tolerance)
-        try:
-            await arm._greet(deadline - loop.time(), fresh=control and queue == "fresh")
-        except BaseException:
-            await undisturbed(arm._close())
-            raise
-
-        try:
+        greet = arm._greet(left(deadline, timeout), fresh=control and queue == "fresh")
+        leave = arm._leave if control and on_error == "stop" else None
+        async with held(greet, leave=leave, close=arm._close):
             yield arm
-        except BaseException:
-            if control and on_error == "stop":
-                await undisturbed(arm._leave())
-
-            raise
-        finally:
             unsent = arm._executor.unsent
-            await undisturbed(arm._close())
 
         if unsent:
             raise MotionStopped(
@@ -218,6 +206,7 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
         """Jogs until the block ends, however it ends."""
         command, value = self._jog(direction, speed)
         self.link.frame(self._model.row(command), value)
+        self._model.check(command, value)
         try:
             await self._channel.tell(command, value)
             yield
@@ -245,7 +234,6 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
 
         way = c.Direction.UP if found["way"] == "+" else c.Direction.DOWN
         if found["joint"]:
-            self._model.check_joint(int(found["joint"]), 0.0)
             return c.JOG_ANGLE, c.JogJoint(int(found["joint"]), way, speed)
 
         return c.JOG_COORD, c.JogAxis(AXES.index(found["axis"]) + 1, way, speed)

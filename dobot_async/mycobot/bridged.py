@@ -12,7 +12,7 @@ from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any
 
-from dobot_async.bridged import Kind, Reading
+from dobot_async.bridged import ByKey, Kind, Reading
 from dobot_async.contract import Parser
 from dobot_async.errors import ProtocolError
 from dobot_async.mycobot import commands as c
@@ -20,7 +20,7 @@ from dobot_async.mycobot import frame as f
 from dobot_async.mycobot.alarms import joint_alarms
 from dobot_async.mycobot.arm import GAP, opened, with_baud
 from dobot_async.mycobot.frame import Frame
-from dobot_async.mycobot.models import AXES, MODELS, CobotModel, lengths
+from dobot_async.mycobot.models import AXES, DEFAULT, MODELS, CobotModel, lengths
 from dobot_async.transports import Transport
 from dobot_async.wire import Command
 
@@ -76,7 +76,7 @@ class CobotWatch:
 STOPS = frozenset({c.STOP, c.JOG_STOP})
 
 
-class BridgedCobot:
+class BridgedCobot(ByKey[Frame]):
     """See `dobot_async.bridged.Bridged`; one for each model."""
 
     filler = b""
@@ -191,5 +191,6 @@ def request(model: CobotModel, command: Command[None, Any]) -> Frame:
     return f.request(model.row(command), b"", queued=False)
 
 
-BRIDGED: Mapping[str, BridgedCobot] = MappingProxyType({name: BridgedCobot(model) for name, model in MODELS.items()})
-"""What a bridge knows of each model."""
+COBOTS = {name: BridgedCobot(model) for name, model in MODELS.items()}
+BRIDGED: Mapping[str, BridgedCobot] = MappingProxyType({"mycobot": COBOTS[DEFAULT], **COBOTS})
+"""What a bridge knows of each model; without one it is the usual one."""

@@ -14,16 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 from dobot_async.layouts import NOTHING
 from dobot_async.mycobot.layouts import ACK, Axis, Fixed, Octets, Packed, Value, Whole
 from dobot_async.mycobot.params import *
 from dobot_async.mycobot.variants import PositionLayout, ServoRegister
-from dobot_async.wire import Command, Layout, Queueing
-
-Q = TypeVar("Q")
-R = TypeVar("R")
+from dobot_async.rows import Rows
+from dobot_async.wire import Command, Queueing
 
 FLAG = Value[bool](flag)
 BYTE = Value[int](byte)
@@ -38,7 +36,7 @@ VERSION = Value[float](tenths)
 VOLTS = Value[tuple[float, ...]](volts)
 SERVO = Value[int](servo)
 SERVO_OR_ALL = Value[int](servo_or_all)
-DAMPING = Value[int | None](Annotated[int | None, Fixed("B", low=0, high=1, optional=True)])
+UNDAMPED = Value[int | None](Annotated[int | None, Fixed("B", low=0, high=1, optional=True)])
 GRIPPER_TYPE = Value[GripperType | None](Annotated[GripperType | None, Fixed("B", optional=True)])
 REFERENCE_FRAME = Value[ReferenceFrame](Annotated[ReferenceFrame, Fixed("B")])
 MOVE_MODE = Value[MoveMode](Annotated[MoveMode, Fixed("B")])
@@ -51,57 +49,8 @@ ALLOWED, ALWAYS = Queueing.ALLOWED, Queueing.ALWAYS
 SLOW = 3.0  # seconds that an arm may take for what its servos have to be asked, or told, one by one
 
 
-def read(name: str, number: int, reply: type[R] | Layout[R], section: str) -> Command[None, R]:
-    """A row that asks for something, with no parameters."""
-    return Command(name, number, NOTHING, layout(reply), section)
-
-
-def ask(
-    name: str,
-    number: int,
-    request: type[Q] | Layout[Q],
-    reply: type[R] | Layout[R],
-    section: str,
-    echo: str | None = None,
-) -> Command[Q, R]:
-    """A row that asks for something that the request names."""
-    return Command(name, number, layout(request), layout(reply), section, echo=echo)
-
-
-def write(
-    name: str,
-    number: int,
-    request: type[Q] | Layout[Q],
-    section: str,
-    queueing: Queueing = Queueing.NEVER,
-    *,
-    repeatable: bool = True,
-    timeout: float = 1.5,
-    moves: bool = False,
-) -> Command[Q, None]:
-    """A row that sets something; newer firmware acknowledges it."""
-    return Command(
-        name,
-        number,
-        layout(request),
-        ACK,
-        section,
-        write=True,
-        queueing=queueing,
-        repeatable=repeatable,
-        timeout=timeout,
-        moves=moves,
-    )
-
-
-def motion(name: str, number: int, request: type[Q] | Layout[Q], section: str) -> Command[Q, None]:
-    """A row that moves the arm to somewhere; it is sent once, whatever becomes of its acknowledgement."""
-    return write(name, number, request, section, ALWAYS, repeatable=False, moves=True)
-
-
-def layout(kind: type[Q] | Layout[Q]) -> Layout[Q]:
-    """The layout itself, or that of a dataclass."""
-    return Packed(kind) if isinstance(kind, type) else kind
+ROWS = Rows(Packed, ACK)
+read, ask, write, motion = ROWS.read, ROWS.ask, ROWS.write, ROWS.motion
 
 
 # The controller
@@ -113,7 +62,7 @@ GET_ATOM_VERSION = read("GetAtomVersion", 0x09, VERSION, "later")
 POWER_ON = write("PowerOn", 0x10, NOTHING, "Powering up", timeout=SLOW)
 POWER_OFF = write("PowerOff", 0x11, NOTHING, "Power Decreasing and Connection Breaking up", timeout=SLOW)
 IS_POWER_ON = read("IsPowerOn", 0x12, FLAG, "Checking the Status of Atom")
-RELEASE_ALL_SERVOS = write("ReleaseAllServos", 0x13, DAMPING, "Power Decreasing", timeout=SLOW)
+RELEASE_ALL_SERVOS = write("ReleaseAllServos", 0x13, UNDAMPED, "Power Decreasing", timeout=SLOW)
 IS_CONTROLLER_CONNECTED = read("IsControllerConnected", 0x14, FLAG, "Robot System Checking: Normal")
 READ_NEXT_ERROR = read("ReadNextError", 0x15, Octets(4, 8), "Abnormal Error Detection")
 SET_FRESH_MODE = write("SetFreshMode", 0x16, FLAG, "Command Updating Mode")

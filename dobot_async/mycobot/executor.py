@@ -35,7 +35,8 @@ Tolerance = tuple[float, float]
 POLL = 0.05  # seconds between two looks; the Atom takes 20 ms for each reading
 SILENCE = 5.0  # seconds without an answer after which the arm counts as lost
 UNSURE = 0.3  # seconds to wait for an answer that older firmware does not give
-CHECK = 10  # looks between two questions for errors
+SOON = 0.3  # seconds before the end of a motion from when on it is looked at without a pause
+CHECK, CHECK_LATER = 1.0, 2.0  # seconds between two questions for errors; they cost looks where the end is near
 STOP_PATIENCE, STOP_TIME = 0.1, 2.0
 GRIPPER_LOOKS, GRIPPER_TIME = 3, 10.0
 
@@ -50,7 +51,7 @@ class Seconds:
 
         return b""
 
-    def decode(self, data: bytes) -> float:  # noqa: ARG002
+    def decode(self, data: bytes) -> float:  # noqa: ARG002 - it has nothing to read
         """Is never called."""
         return 0.0
 
@@ -68,6 +69,8 @@ class CobotHand:
         self._channel = channel
         self._goals = Goals(channel, *tolerance)
         self._paused = False
+        self._watching: Watch | None = None
+        self._lost = 0
 
     async def connected(self) -> None:
         """Returns when the link is open."""
@@ -77,7 +80,7 @@ class CobotHand:
         """Returns a checked and encoded command."""
         row = command if command is WAIT else self._channel.model.row(command)
         frame = self._channel.link.frame(row, value, queued=True)
-        self._channel.model.check(value)
+        self._channel.model.check(command, value)
         return Entry(command, value, frame)
 
     async def execute(self, entry: Entry) -> None:
@@ -129,6 +132,8 @@ class CobotHand:
         """Lets the arm go on."""
         await self._channel.tell(c.RESUME, None)
         self._paused = False
+        if self._watching:
+            self._watching.hold(asyncio.get_running_loop().time())
 
     async def alarms(self) -> tuple[CobotAlarm, ...]:
         """Returns what keeps the arm from moving, and what was wrong with its last motion."""
@@ -143,33 +148,44 @@ class CobotHand:
     async def _watch(self, goal: Goal, entry: Entry) -> None:
         """Returns when the arm stands where a motion leads, and raises when it never will."""
         loop = asyncio.get_running_loop()
-        watch = Watch(goal, loop.time())
-        lost = looks = 0
+        watch = self._watching = Watch(goal, loop.time())
+        checked, self._lost = loop.time(), 0
         while True:
-            here = numbers(await self._read(goal.read))
             moving = await self._read(c.IS_MOVING)
-            looks += 1
-            lost = lost + 1 if goal.read is c.GET_ANGLES and cannot_read_servos(here) else 0
-            if lost == LOOKS:
-                raise ArmAlarm(f"the arm raised alarms: {SERVO_LOSS}", [SERVO_LOSS])
+            if watch.settled and not moving:
+                return
 
-            verdict = watch.look(loop.time(), here, moving=moving)
+            here = await self._position(goal)
+            now = loop.time()
+            verdict = watch.look(now, here, moving=moving)
+            soon = watch.ends_at - SOON < now
             if verdict is Verdict.ARRIVED and watch.moved:
                 return
 
-            if verdict is not Verdict.GOING or looks % CHECK == 0:
+            if verdict is not Verdict.GOING or now > checked + (CHECK_LATER if soon else CHECK):
+                checked = now
                 await self._raise_alarms(everything=verdict in {Verdict.SHORT, Verdict.IDLE})
 
             if verdict is Verdict.ARRIVED:
                 return
 
             if verdict in {Verdict.SHORT, Verdict.IDLE}:
-                if not await self._read(c.IS_PAUSED):
+                if await self._read(c.IS_PAUSED):
+                    watch.hold(loop.time())
+                elif watch.anchor:  # else it was let go on since
                     raise await self._why(verdict, entry, goal.missed(here))
 
-                watch.hold(loop.time())
+            if not soon:
+                await asyncio.sleep(POLL)
 
-            await asyncio.sleep(POLL)
+    async def _position(self, goal: Goal) -> Sequence[float]:
+        """Returns where the arm is; raises ArmAlarm if it could not read its servos several times in a row."""
+        here = numbers(await self._read(goal.read))
+        self._lost = self._lost + 1 if goal.read is c.GET_ANGLES and cannot_read_servos(here) else 0
+        if self._lost == LOOKS:
+            raise ArmAlarm(f"the arm raised alarms: {SERVO_LOSS}", [SERVO_LOSS])
+
+        return here
 
     async def _read(self, command: Command[None, R]) -> R:
         """Asks the arm, through an outage of the link if it is reopened."""

@@ -40,7 +40,6 @@ class Goals:
 
     async def angle(self, value: c.JointMove) -> Goal:
         """One joint."""
-        self.channel.model.check_joint(value.joint, value.angle)
         return self.joints({value.joint - 1: value.angle})
 
     async def joint_step(self, value: c.JointMove) -> Goal:

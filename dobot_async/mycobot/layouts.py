@@ -237,7 +237,7 @@ class Acknowledgement:
 
         return b"\x01"
 
-    def decode(self, data: bytes) -> None:  # noqa: ARG002
+    def decode(self, data: bytes) -> None:  # noqa: ARG002 - whatever it is, it says nothing
         """Accepts anything."""
         return
 

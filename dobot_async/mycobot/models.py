@@ -26,13 +26,14 @@ from dobot_async.mycobot.layouts import Many
 from dobot_async.mycobot.variants import PositionLayout
 from dobot_async.wire import Command, Layout
 
-__all__ = ["AXES", "MODELS", "CobotModel", "lengths", "model_of"]
+__all__ = ["AXES", "DEFAULT", "MODELS", "CobotModel", "lengths", "model_of"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
 Range = tuple[float, float]
 Dialect = Mapping[Command[Any, Any], Mapping[str, Any]]
 AXES = ("x", "y", "z", "rx", "ry", "rz")
+DEFAULT = "mycobot280"
 TURN: Range = (-180.0, 180.0)
 ACKNOWLEDGED = frozenset({0, 1})
 SENTINEL = 180.08
@@ -88,16 +89,25 @@ class CobotModel:
 
     def check_coord(self, axis: int, value: float) -> None:
         """Raises ValueError for an axis that it does not have, or a coordinate that it never reaches."""
-        if not 1 <= axis <= len(self.reach):
-            raise ValueError(f"a {self.title} has the axes 1 to {len(self.reach)}, not {axis}")
-
+        self.check_axis(axis)
         low, high = self.reach[axis - 1]
         if not low <= value <= high:
             raise ValueError(f"{AXES[axis - 1]} must be in {low:g} to {high:g}, not {value!r}")
 
-    def check(self, value: Any) -> None:
+    def check_axis(self, axis: int) -> None:
+        """Raises ValueError for an axis that it does not have."""
+        if not 1 <= axis <= len(self.reach):
+            raise ValueError(f"a {self.title} has the axes 1 to {len(self.reach)}, not {axis}")
+
+    def check(self, command: Command[Any, Any], value: Any) -> None:
         """Raises ValueError for the parameters of a motion that this model cannot do, whatever its pose."""
         match value:
+            case c.JointMove() if command is not c.JOG_INCREMENT:
+                self.check_joint(value.joint, value.angle)
+            case c.JointMove() | c.JogJoint():
+                self.check_joint(value.joint, 0.0)
+            case c.JogAxis() | c.CoordStep():
+                self.check_axis(value.axis)
             case c.JointsMove():
                 for joint, angle in enumerate(value.angles, 1):
                     self.check_joint(joint, angle)

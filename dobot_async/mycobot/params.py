@@ -328,10 +328,10 @@ class ServoData:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Lets a servo go; with damping 1 it gives way slowly."""
+    """Lets a servo go; damped, unless `undamped` is 1."""
 
     joint: servo
-    damping: Annotated[int | None, Fixed("B", low=0, high=1, optional=True)] = None
+    undamped: Annotated[int | None, Fixed("B", low=0, high=1, optional=True)] = None
 
 
 @dataclass(frozen=True, slots=True)

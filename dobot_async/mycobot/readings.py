@@ -63,11 +63,7 @@ class Readings:
 
     async def get_angles(self, *, timeout: float | None = None) -> tuple[float, ...]:
         """Returns the joints, degrees; raises ArmAlarm if the arm cannot read its servos."""
-        angles = await self._channel.ask(c.GET_ANGLES, None, timeout=timeout)
-        if cannot_read_servos(angles):
-            raise ArmAlarm(f"the arm raised alarms: {SERVO_LOSS}", [SERVO_LOSS])
-
-        return angles
+        return believed(await self._channel.ask(c.GET_ANGLES, None, timeout=timeout))
 
     async def get_coords(self, *, timeout: float | None = None) -> c.Coords:
         """Returns where the tool is, mm, and how it is turned, degrees, in the frames that are set."""
@@ -79,7 +75,7 @@ class Readings:
         if both is None:
             coords, joints = await self.get_coords(timeout=timeout), await self.get_angles(timeout=timeout)
         else:
-            coords, joints = c.Coords(*both.coords), both.angles
+            coords, joints = c.Coords(*both.coords), believed(both.angles)
 
         return CobotPose(coords.x, coords.y, coords.z, coords.rx, coords.ry, coords.rz, joints)
 
@@ -124,12 +120,19 @@ class Readings:
         """Powers the servos off: the arm falls. Returns when the arm says that they are."""
         await self._switch(c.POWER_OFF, None, lambda powered: not powered, timeout)
 
-    async def release(self, joint: int | None = None, *, damping: bool = False, timeout: float | None = None) -> None:
-        """Lets one servo (from 1) go, or all: the arm falls, unless somebody holds it. Damped, it gives way slowly."""
+    async def release(self, joint: int | None = None, *, damping: bool = True, timeout: float | None = None) -> None:
+        """Lets one servo (from 1) go, or all: the arm falls, unless somebody holds it; damped, where the firmware can.
+
+        Args:
+            joint: Which one; None for all.
+            damping: False lets it go without; older firmware knows no difference.
+            timeout: Seconds.
+        """
+        undamped = None if damping else 1
         if joint is None:
-            await self._channel.tell(c.RELEASE_ALL_SERVOS, 1 if damping else None, timeout=timeout)
+            await self._channel.tell(c.RELEASE_ALL_SERVOS, undamped, timeout=timeout)
         else:
-            await self._channel.tell(c.RELEASE_SERVO, c.Release(joint, 1 if damping else None), timeout=timeout)
+            await self._channel.tell(c.RELEASE_SERVO, c.Release(joint, undamped), timeout=timeout)
 
     async def focus(self, joint: int | None = None, *, timeout: float | None = None) -> None:
         """Lets one servo (from 1) hold its place again, or all."""
@@ -225,3 +228,11 @@ class Readings:
                 raise ReplyTimeout(f"no answer to {command.name} within {timeout:.3g} s") from None
 
             raise CommandRejected(f"after {command.name} the arm's power stays as it was; is it plugged in?") from None
+
+
+def believed(angles: tuple[float, ...]) -> tuple[float, ...]:
+    """The angles; raises ArmAlarm if they are those of an arm that cannot read its servos."""
+    if cannot_read_servos(angles):
+        raise ArmAlarm(f"the arm raised alarms: {SERVO_LOSS}", [SERVO_LOSS])
+
+    return angles

@@ -49,12 +49,10 @@ class Verbs(Generic[T]):
 
     def move_joint(self, joint: int, angle: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
         """Moves one joint (from 1) to an angle."""
-        self.model.check_joint(joint, angle)
         return self.perform(c.SEND_ANGLE, c.JointMove(joint, angle, speed), timeout)
 
     def step_joint(self, joint: int, degrees: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
         """Moves one joint (from 1) by degrees."""
-        self.model.check_joint(joint, 0.0)
         return self.perform(c.JOG_INCREMENT, c.JointMove(joint, degrees, speed), timeout)
 
     def move_to(

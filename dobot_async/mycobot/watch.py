@@ -6,7 +6,8 @@
                                 IDLE       it never moved, and it should have begun by now
 
 The arm's moving flag and its position are both believed a little: the flag may be stuck, and a frame without a checksum
-may be spoilt. So several looks in a row have to agree.
+may be spoilt. So they have to agree: the flag is off, and the position is that of the look before. An arm that may be
+creeping has to do so several times in a row.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ from dobot_async.wire import Command
 
 __all__ = ["Goal", "Verdict", "Watch", "cannot_read_servos", "turned"]
 
-LOOKS = 3  # in a row, all of them still
+LOOKS = 3  # in a row, all of them still, of an arm that was not seen to move
+MOVED, FAST = 2, 1  # the same for one that has moved, and for one that was so fast that it cannot be creeping
+RUSH = 100.0  # speed of such an arm, in what counts as still, a second
 STILL = 0.2  # degrees or mm within which an arm stands still
 START = 1.5  # seconds within which a motion begins
 REST = 1.0  # seconds of standing still elsewhere, after which it counts as over
@@ -60,6 +63,14 @@ class Goal:
 
     def missed(self, here: Sequence[float]) -> float:
         """Returns by how much the goal is missed, in the unit of the worst place; 0 within the tolerances."""
+        return max((gap for place, gap in self.gaps(here).items() if gap > self.tolerance(place)), default=0.0)
+
+    def distance(self, here: Sequence[float]) -> float:
+        """Returns how far away the goal is, in the unit of the worst place, tolerances left aside."""
+        return max(self.gaps(here).values(), default=0.0)
+
+    def gaps(self, here: Sequence[float]) -> dict[int, float]:
+        """Returns how far away it is in each place."""
         gaps = {place: abs(here[place] - wanted) for place, wanted in self.expected.items()}
         if self.rotation:
             gaps = {place: gap for place, gap in gaps.items() if place < 3}
@@ -68,7 +79,7 @@ class Goal:
         for place in self.round & gaps.keys():
             gaps[place] = abs(math.remainder(gaps[place], 360))
 
-        return max((gap for place, gap in gaps.items() if gap > self.tolerance(place)), default=0.0)
+        return gaps
 
     def tolerance(self, place: int) -> float:
         """How near the number at a place has to be."""
@@ -83,6 +94,9 @@ class Watch:
         goal: Where it leads.
         since: When it was sent, or when the arm was last seen to be paused.
         moved: Whether the arm has been seen to move.
+        ends_at: When it will be there, if it goes on as it does.
+        fastest: The greatest speed at which it came nearer.
+        settled: Whether a fast arm was twice in a row at one place, where it was to go: its flag alone is enough then.
     """
 
     goal: Goal
@@ -91,6 +105,10 @@ class Watch:
     anchor: Sequence[float] = field(default_factory=tuple)
     still_since: float = 0.0
     looks: int = 0
+    ends_at: float = math.inf
+    fastest: float = 0.0
+    distance: tuple[float, float] | None = None
+    settled: bool = False
 
     def look(self, now: float, here: Sequence[float], *, moving: bool) -> Verdict:
         """Takes what the arm told at a time; returns what is to be made of it."""
@@ -105,17 +123,39 @@ class Watch:
         else:
             self.looks += 1
 
+        self.expect(now, here)
         resting = now - self.still_since
+        self.settled = resting > 0 and self.needed == FAST and not self.goal.missed(here)
         if moving and resting < STUCK:
             return Verdict.GOING
 
         if not self.goal.missed(here):
-            return Verdict.ARRIVED if moving or self.looks >= LOOKS else Verdict.GOING
+            return Verdict.ARRIVED if moving or self.looks >= self.needed else Verdict.GOING
 
         if self.moved:
             return Verdict.SHORT if resting >= REST else Verdict.GOING
 
         return Verdict.IDLE if now - self.since >= START else Verdict.GOING
+
+    @property
+    def needed(self) -> int:
+        """How many still looks in a row are enough."""
+        if self.fastest > RUSH * self.goal.still:
+            return FAST
+
+        return MOVED if self.moved else LOOKS
+
+    def expect(self, now: float, here: Sequence[float]) -> None:
+        """Notes when the arm will be there: now, if it is and has moved, else as its speed tells."""
+        distance = self.goal.distance(here)
+        if self.moved and not self.goal.missed(here):
+            self.ends_at = now
+        elif self.distance and now > self.distance[0]:
+            speed = (self.distance[1] - distance) / (now - self.distance[0])
+            self.fastest = max(self.fastest, speed)
+            self.ends_at = now + distance / speed if speed > 0 else math.inf
+
+        self.distance = now, distance
 
     def stand(self, now: float, here: Sequence[float]) -> None:
         """Takes where the arm is for where it may be standing."""
@@ -125,6 +165,8 @@ class Watch:
         """The arm is paused: nothing that it does not do now says anything."""
         self.since = now
         self.anchor = ()
+        self.settled = False
+        self.distance, self.ends_at = None, math.inf
 
 
 def cannot_read_servos(angles: Sequence[float]) -> bool:

@@ -12,18 +12,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from dobot_async.errors import ProtocolError
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.frame import MAX_LENGTH, Frame, Parser, encode
 from dobot_async.mycobot.layouts import ACK
-from dobot_async.mycobot.models import model_of
+from dobot_async.mycobot.models import DEFAULT, MODELS, model_of
 from dobot_async.simulator.device import DeviceOptions
 from dobot_async.simulator.mycobot_body import HEAT, VOLTAGE, MyCobotBody
 from dobot_async.wire import Command
 
-__all__ = ["MyCobotCounters", "MyCobotQuirks", "MyCobotSession", "SimulatedMyCobot"]
+__all__ = ["SIMULATED", "MyCobotCounters", "MyCobotQuirks", "MyCobotSession", "SimulatedMyCobot"]
 
 READ_BACK = {read: row for row, read in c.CONFIRMED_BY.items()}
 BY_M5 = frozenset({c.SET_BASIC_OUTPUT, c.SET_TRANSPONDER_MODE})
@@ -289,3 +290,8 @@ VERBS: Mapping[Command[Any, Any], Callable[[SimulatedMyCobot, Any], None]] = {
     c.SET_COLOR: set_color,
 }
 """What commands do that is more than to be remembered."""
+
+SIMULATED: Mapping[str, Callable[..., SimulatedMyCobot]] = {
+    name: partial(SimulatedMyCobot, model=DEFAULT if name == "mycobot" else name) for name in ("mycobot", *MODELS)
+}
+"""What makes each model."""

@@ -13,7 +13,7 @@ from typing import Any, Literal, Self, TypeVar
 import anyio
 
 from dobot_async.errors import CommandRejected, ConnectFailed, DobotError
-from dobot_async.family import open_in_time, owned
+from dobot_async.family import held, left, open_in_time, owned
 from dobot_async.link import Link
 from dobot_async.motion import undisturbed
 from dobot_async.roundtrip import RoundTrip
@@ -148,21 +148,10 @@ class UltraArm(Verbs[Awaitable[None]]):
             reopen=partial(opened, url, timeout) if reconnect else None,
         )
         arm = cls(link, limits=limits, pump=pump, depth=depth, tolerance=tolerance, on_stop=on_stop)
-        try:
-            await arm._greet(deadline - asyncio.get_running_loop().time(), fresh=queue == "fresh")
-        except BaseException:
-            await undisturbed(arm._close())
-            raise
-
-        try:
+        greet = arm._greet(left(deadline, timeout), fresh=queue == "fresh")
+        leave = arm._leave if control and on_error == "stop" else None
+        async with held(greet, leave=leave, close=arm._close):
             yield arm
-        except BaseException:
-            if control and on_error == "stop":
-                await undisturbed(arm._leave())
-
-            raise
-        finally:
-            await undisturbed(arm._close())
 
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
         """Sends any row of the command table at once, and returns the arm's answer.
@@ -243,8 +232,10 @@ class UltraArm(Verbs[Awaitable[None]]):
         if self._executor.released:
             raise CommandRejected("the motors have no power: power_on(), then home()")
 
+        command, value = c.JOG_JOINT if is_joint else c.JOG_COORD, c.JogMove(axis, way, speed)
+        self.link.frame(command, value)  # what is wrong is said before anything is sent, a stop included
         try:
-            await self._executor.ask(c.JOG_JOINT if is_joint else c.JOG_COORD, c.JogMove(axis, way, speed))
+            await self._executor.ask(command, value)
             yield
         finally:
             await undisturbed(self.jog_stop())

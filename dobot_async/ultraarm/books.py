@@ -17,6 +17,7 @@ from typing import Any
 
 from dobot_async.executor import Entry
 from dobot_async.ultraarm import commands as c
+from dobot_async.ultraarm.layouts import Status
 from dobot_async.wire import Command
 
 __all__ = ["MODES", "Books", "Given", "Target", "target_of"]
@@ -35,6 +36,12 @@ class Target:
 
     joints: bool
     numbers: Mapping[str, float]
+
+    def told(self, status: Status) -> c.UltraArmCoords | c.UltraArmAngles | None:
+        """Returns where the arm said it is, in what the target is in; None if it did not."""
+        numbers = (status.angles if self.joints else status.coords)[:4]
+        kind = c.UltraArmAngles if self.joints else c.UltraArmCoords
+        return kind(*numbers) if len(numbers) >= 3 else None
 
     def miss(self, here: c.UltraArmCoords | c.UltraArmAngles) -> float:
         """Returns the greatest distance of an axis from the target, mm or degrees."""
@@ -121,6 +128,11 @@ class Books:
         self.completed = self.taken
         self.verified = True
         return self.completed
+
+    @property
+    def alone(self) -> bool:
+        """Whether one motion is all that is open, and it is known where it leads."""
+        return len(self.open) == 1 and self.target is not None and self.open[0].entry.command.moves
 
     @property
     def dwell(self) -> float:

@@ -12,7 +12,6 @@ end within a moment is ended by M17, which takes the power off the motors.
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -26,22 +25,18 @@ from dobot_async.link import Link
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.books import MODES, Books, Target, target_of
 from dobot_async.ultraarm.frame import Frame, errors
-from dobot_async.ultraarm.layouts import AND_ANGLES, Answer, Receipt, Refusal, Status
+from dobot_async.ultraarm.layouts import Answer, Receipt, Refusal, Status
+from dobot_async.ultraarm.sight import PACE, RESTS, SILENCE, Sight
 from dobot_async.wire import Command
 
 __all__ = ["Missed", "UltraArmExecutor"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-SILENCE = 5.0  # seconds without an answer after which the arm counts as lost, and what is under way as unknown
-PACE = 0.02  # seconds between two looks at an arm that moves
-RESTS = 2  # looks in a row at which it rests: between two motions it may look so once; not behind the only one
-SOON = 0.15  # seconds before the end of a motion from when on it is looked at without a pause
 SETTLED = 0.2  # seconds of rest elsewhere than it was told to, after which an arm has missed its target
 GRAIN = 0.02  # mm and degrees; the arm tells hundredths
 BRAKING = 5  # looks at an arm that was told to stop
 GIVING_UP = 50  # looks at an arm without power, after which it counts as one that cannot be stopped
-TELLING = 0.1  # seconds that an arm waits and looks busy, after which it is known that it does so
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,19 +79,13 @@ class UltraArmExecutor:
         self._awaited: Answer[Any] = Answer(None)
         self._accepted: Accepted = lambda _entry, _ticket: None
         self._answers: dict[Command[Any, Any], Command[Any, Any]] = {}
-        self._size: int | None = None
+        self._sight = Sight(self.ask, self._books)
         self._says_ok: bool | None = None
         self._draining = False
         self._mode_known = False
-        self._tells_dwell = False
         self._slipped = False
         self._halts = 0
         self._fault: Missed | None = None
-        self._rests = 0
-        self._seen = False
-        self._distance: tuple[float, float] | None = None
-        self._ends_at = math.inf
-        self._rest_since = self._looked_at = self._rested_at = self._taken_at = -math.inf
         self._outages = 0
 
     @property
@@ -109,7 +98,7 @@ class UltraArmExecutor:
         await self._link.opened()
         if self._outages != self._link.outages:
             self._outages = self._link.outages
-            self._size = None
+            self._sight.size = None
             self._mode_known = False
             if self._books.open and (self._books.target is None or self._tolerance is None):
                 raise MotionUnknown("the link was lost, and nothing tells whether the arm was switched off meanwhile")
@@ -127,7 +116,7 @@ class UltraArmExecutor:
 
         self._note(command)
         if isinstance(answer, Receipt):
-            self._size = answer.queue_size
+            self._sight.size = answer.queue_size
 
         return cast(R, answer)
 
@@ -144,7 +133,7 @@ class UltraArmExecutor:
 
     async def left_space(self) -> int:
         """Returns how many more commands are to lie in the arm's queue; none while it runs out."""
-        status = await self._look()
+        status = await self._sight.look()
         if self._draining and not (status.at_rest and status.queue_size == 0):
             return 0
 
@@ -178,14 +167,11 @@ class UltraArmExecutor:
 
     async def completed(self) -> int | None:
         """Returns the ticket of the last command that is done."""
-        soon = self._rests or self._now() > self._ends_at - SOON
-        await self._sleep_until(self._looked_at + (0.0 if soon else PACE))
-        status = await self._look()
+        status = await self._sight.next()
         if status.text and errors(status.text.encode()) and self._books.open:
             self._fault = Missed(status.text)
 
-        dwell = 0.0 if self._tells_dwell else self._books.dwell
-        if self._rests < (1 if self._seen and self._books.alone else RESTS) or self._now() < self._rest_since + dwell:
+        if not self._sight.done:
             return self._books.waiting(status.queue_size)
 
         return self._books.waiting(0) if self._misses_target(status) else self._books.all_done()
@@ -218,17 +204,17 @@ class UltraArmExecutor:
         with suppress(CommandRejected):  # an error that comes late may be of another command; what follows shows it
             await self.ask(c.JOG_STOP, None, timeout=SILENCE, urgent=True)
 
-        if await self._comes_to_rest(BRAKING) or self._on_stop == "finish":
+        if await self._sight.comes_to_rest(BRAKING) or self._on_stop == "finish":
             return
 
         with suppress(CommandRejected):
             await self.ask(c.RELEASE, None, timeout=SILENCE, urgent=True)
 
         self.released = True
-        if not await self._comes_to_rest(GIVING_UP):
+        if not await self._sight.comes_to_rest(GIVING_UP):
             raise CommandRejected(
-                f"the arm goes on, with {self._size} more commands in its queue: its protocol has nothing that ends "
-                "them; switch it off"
+                f"the arm goes on, with {self._sight.size} more commands in its queue: its protocol has nothing that "
+                "ends them; switch it off"
             )
 
     async def reset(self) -> None:
@@ -237,7 +223,7 @@ class UltraArmExecutor:
             await self.halt()
             self._slipped = False
 
-        while self._on_stop == "finish" and not await self._comes_to_rest(GIVING_UP):
+        while self._on_stop == "finish" and not await self._sight.comes_to_rest(GIVING_UP):
             pass
 
         self.room = 0
@@ -261,7 +247,7 @@ class UltraArmExecutor:
         """Proves that an arm answers; with `fresh`, nothing is put until what it still has to do is done."""
         receipt = await self.ask(c.GET_QUEUE_SIZE, None, timeout=timeout)
         self._draining = fresh
-        self._size = receipt.queue_size
+        self._sight.size = receipt.queue_size
 
     async def _give(self, entry: Entry) -> bool:
         """Sends a command once; returns whether the arm took it."""
@@ -293,11 +279,11 @@ class UltraArmExecutor:
         What waits can only become less by itself: if it has become more, it was taken. What may be done twice is not
         taken then, as far as anybody needs to know. Else the arm is left to run out, and where it comes to rest tells.
         """
-        before, name = self._size, entry.command.name
+        before, name = self._sight.size, entry.command.name
         try:
             while True:
                 await self._link.opened()
-                status = await self._look()
+                status = await self._sight.look()
                 self._awaited.over = True  # asked behind it, answered before it
                 if before is not None and status.queue_size > before:
                     return self._taken(entry, status.queue_size)
@@ -305,7 +291,7 @@ class UltraArmExecutor:
                 if entry.command.repeatable:
                     return self._not_taken()
 
-                if self._rests >= RESTS:
+                if self._sight.rests >= RESTS:
                     break
 
                 await asyncio.sleep(PACE)
@@ -351,10 +337,8 @@ class UltraArmExecutor:
     def _enter(self, entry: Entry, size: int) -> None:
         """The arm took a command."""
         self._under_way = []
-        self._size = size
-        self._busy()
-        self._seen = False
-        self._taken_at = self._now()
+        self._sight.size = size
+        self._sight.given()
         self._note(entry.command)
         self._accepted(entry, self._books.take(entry))
 
@@ -365,87 +349,23 @@ class UltraArmExecutor:
         if command in POWERING:
             self.released = POWERING[command]
 
-    def _busy(self) -> None:
-        """The arm has something to do."""
-        self._rests = 0
-
-    async def _look(self, *, urgent: bool = False) -> Status:
-        """Asks how far the arm is."""
-        target = self._books.target
-        row = STATUS_AND_ANGLES if target and target.joints else c.GET_STATUS
-        try:
-            status = await self.ask(row, None, timeout=SILENCE, urgent=urgent)
-        except ProtocolError as error:
-            raise ReplyTimeout(f"the arm does not say how far it is: {error}") from error
-
-        self._looked_at = self._now()
-        self._size = status.queue_size
-        self._expect(status)
-        if not status.at_rest or status.queue_size:
-            self._busy()
-            self._seen = not status.at_rest and self._books.alone
-            alone = len(self._books.open) == 1 and self._books.open[0].entry.command is c.WAIT
-            self._tells_dwell = self._tells_dwell or (alone and self._now() > self._taken_at + TELLING)
-        elif self._now() >= self._rested_at + PACE / 2:
-            self._rested_at = self._now()
-            self._rest_since = self._rest_since if self._rests else self._rested_at
-            self._rests += 1
-
-        return status
-
-    def _expect(self, status: Status) -> None:
-        """Notes when the arm will be where it is to go, if it goes on as it does."""
-        target = self._books.target
-        here = target.told(status) if target else None
-        if target is None or here is None:
-            self._distance, self._ends_at = None, math.inf
-            return
-
-        now, distance = self._now(), target.miss(here)
-        if self._distance and now > self._distance[0]:
-            speed = (self._distance[1] - distance) / (now - self._distance[0])
-            self._ends_at = now + distance / speed if speed > 0 else math.inf
-
-        self._distance = now, distance
-
     def _misses_target(self, status: Status) -> bool:
         """Whether an arm at rest is not where the last motion leads, and may yet settle; a fault if that stays so."""
         target = self._books.target
-        here = target.told(status) if target else None
-        if target is None or here is None or self._tolerance is None or self._fault or self._books.verified:
+        if target is None or self._tolerance is None or self._fault or self._books.verified:
             return False
 
-        if target.miss(here) <= self._tolerance:
+        here = target.told(status)
+        if here and target.miss(here) <= self._tolerance:
             return False
 
-        if self._now() < self._rest_since + SETTLED:
+        if self._sight.now() < self._sight.rest_since + SETTLED:
             return True
 
-        self._fault = Missed(f"it came to rest at {here} instead of {target}: out of reach, not homed, or obstructed")
+        where = here or "somewhere that it does not tell"
+        self._fault = Missed(f"it came to rest at {where} instead of {target}: out of reach, not homed, or obstructed")
         return False
 
-    async def _comes_to_rest(self, looks: int) -> bool:
-        """Whether the arm rests and has nothing more to do, within so many looks."""
-        self._rests = 0
-        for _ in range(looks):
-            await self._look(urgent=True)
-            if self._rests >= RESTS:
-                return True
-
-            await asyncio.sleep(PACE)
-
-        return False
-
-    async def _sleep_until(self, when: float) -> None:
-        seconds = when - self._now()
-        if seconds > 0:
-            await asyncio.sleep(seconds)
-
-    def _now(self) -> float:
-        return asyncio.get_running_loop().time()
-
-
-STATUS_AND_ANGLES = replace(c.GET_STATUS, request=AND_ANGLES)
 
 POWERING: Mapping[Command[Any, Any], bool] = MappingProxyType({c.RELEASE: True, c.POWER_ON: False})
 """Whether the motors have no power after a command."""

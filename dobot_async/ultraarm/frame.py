@@ -17,7 +17,22 @@ from typing import Any, NamedTuple
 
 from dobot_async.wire import Command, Queueing
 
-__all__ = ["END", "LONGEST", "Frame", "Parser", "bracket", "encode", "errors", "split_words"]
+__all__ = [
+    "CLOSING",
+    "COORDS",
+    "END",
+    "LONGEST",
+    "SIZE",
+    "STATUS",
+    "SWITCHES",
+    "Frame",
+    "Parser",
+    "bracket",
+    "encode",
+    "errors",
+    "printable",
+    "split_words",
+]
 
 END = b"\r"
 SIZE, SWITCHES, COORDS = b"M120", b"M119", b"M114"
@@ -88,7 +103,7 @@ class Parser:
 
     def feed(self, data: bytes) -> list[Frame]:
         """Takes the next bytes of the stream, returns the answers that they close."""
-        text = data.translate(None, NOISE)
+        text = printable(data)
         self.junk_bytes += len(data) - len(text)
         buffer = self._buffer + text
         frames = []
@@ -111,6 +126,11 @@ class Parser:
         """Forgets the answer that is not closed yet: another stream begins."""
         self.junk_bytes += len(self._buffer)
         self._buffer = b""
+
+
+def printable(data: bytes) -> bytes:
+    """What of the data is text."""
+    return bytes(data.translate(None, NOISE))
 
 
 def bracket(keyword: str) -> re.Pattern[bytes]:

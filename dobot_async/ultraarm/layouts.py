@@ -10,13 +10,15 @@ import math
 import operator
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from dobot_async.errors import ProtocolError
+from dobot_async.layouts import NOTHING
 from dobot_async.ultraarm.frame import bracket, errors, split_words
 
 __all__ = [
+    "AND_ANGLES",
     "RECEIPT",
     "STATUS",
     "Answer",
@@ -33,8 +35,10 @@ __all__ = [
 
 T = TypeVar("T")
 QUEUE_SIZE = bracket("QUEUE SIZE")
-COORDS = re.compile(rb"(DATA\s*:\s*)?" + bracket("COORDS").pattern, re.IGNORECASE)
-ENDSTOP = re.compile(rb"(DATA\s*:\s*)?" + bracket("ENDSTOP").pattern, re.IGNORECASE)
+ANGLES, COORDS, ENDSTOP = (
+    re.compile(rb"(?:DATA\s*:\s*)?" + bracket(keyword).pattern, re.IGNORECASE)
+    for keyword in ("ANGLES", "COORDS", "ENDSTOP")
+)
 MOVING_END = re.compile(rb"Moving\s*end", re.IGNORECASE)
 READ = re.compile(rb"[A-Z0-9]\s*\[|Moving\s*end", re.IGNORECASE)
 """What an answer to a reading holds, and a receipt does not, its QUEUE SIZE left aside."""
@@ -121,12 +125,12 @@ class Words(Generic[T]):
             raise ProtocolError(str(error)) from None
 
         values: dict[str, Any] = {}
-        for field in self.fields:
-            text = given.pop(field.letter.letter, None)
+        for each in self.fields:
+            text = given.pop(each.letter.letter, None)
             if text is not None:
-                values[field.name] = build(field, text)
-            elif not field.optional:
-                raise ProtocolError(f"{field.letter.letter} is missing in {data!r}")
+                values[each.name] = build(each, text)
+            elif not each.optional:
+                raise ProtocolError(f"{each.letter.letter} is missing in {data!r}")
 
         if given:
             raise ProtocolError(f"{data!r} has words that mean nothing: {', '.join(given)}")
@@ -189,11 +193,15 @@ class Status:
         queue_size: How many commands wait in its queue.
         at_rest: Whether nothing moves.
         text: What else it said.
+        coords: Where it is, as it said with that: x, y, z and e; empty where it did not.
+        angles: Its joints, if they were asked as well.
     """
 
     queue_size: int
     at_rest: bool
     text: str = ""
+    coords: tuple[float, ...] = field(default=(), compare=False)
+    angles: tuple[float, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,13 +242,27 @@ class StatusLayout:
         if not ENDSTOP.search(data):
             raise ProtocolError(f"{data!r} answers something else")
 
-        size, text = closing(ENDSTOP.sub(b"", data))
+        size, text = closing(ANGLES.sub(b"", ENDSTOP.sub(b"", data)))
         rest = MOVING_END.sub(b"", text)
-        return Status(size, rest != text, rest.strip().decode("ascii", "replace"))
+        at_rest, text = rest != text, rest.strip()
+        return Status(size, at_rest, text.decode("ascii", "replace"), floats(COORDS, data), floats(ANGLES, data))
+
+
+class AndAngles:
+    """What stands behind M9 to ask for the joints as well: one write, one answer more."""
+
+    def encode(self, value: None) -> bytes:
+        """Returns M12."""
+        return NOTHING.encode(value) + b"\rM12"
+
+    def decode(self, data: bytes) -> None:
+        """An arm reads two lines, never this."""
+        return NOTHING.decode(data.removeprefix(b"\rM12"))
 
 
 RECEIPT = ReceiptLayout()
 STATUS = StatusLayout()
+AND_ANGLES = AndAngles()
 
 
 class Bracket(Generic[T]):
@@ -324,6 +346,17 @@ class Answer(Generic[T]):
             return Refusal("; ".join(found))
 
         return Refusal("; ".join(found)) if found and isinstance(value, Receipt) else value
+
+
+def floats(pattern: re.Pattern[bytes], data: bytes) -> tuple[float, ...]:
+    """The numbers in the last brackets of a kind; none where they cannot be read."""
+    *_, last = (b"", *pattern.findall(data))
+    try:
+        values = tuple(float(each) for each in last.split(b","))
+    except ValueError:
+        return ()
+
+    return values if all(map(math.isfinite, values)) else ()
 
 
 def closing(data: bytes) -> tuple[int, bytes]:

@@ -14,8 +14,10 @@ from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from dobot_async import Magician, MyCobot
+from dobot_async.cli.main import cli
 from dobot_async.simulator import Simulation, simulate
 
 TCP = "tcp://127.0.0.1:0"
@@ -109,6 +111,15 @@ async def test_a_token_of_ones_own_is_not_printed(sim: Simulation, source: str, 
         assert b"geheim" not in output + errors
 
 
+@pytest.mark.parametrize("text", [b"", b" \n", b"gehe\xffim"])
+def test_a_file_without_a_token_is_named(text: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    file.write_bytes(text)
+    done = CliRunner().invoke(cli, ["bridge", "sim:", TCP, "--token-file", str(file)])
+    assert done.exit_code == 2
+    assert f"{file} has no token" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
@@ -142,7 +153,7 @@ async def test_an_arm_of_another_family() -> None:
 
 @pytest.mark.parametrize(
     ("arm", "more", "told"),
-    [("ultraarm", (), b"do not tell whose they are"), ("mycobot", ("--deny", "wifi"), b"deny to be of calibration")],
+    [("ultraarm", ("udp://127.0.0.1:0",), b"but their order"), ("mycobot", ("--deny", "wifi"), b"deny to be of")],
 )
 async def test_what_a_family_cannot_do(arm: str, more: tuple[str, ...], told: bytes) -> None:
     async with started("sim:", TCP, *more, before=("--arm", arm)) as process:

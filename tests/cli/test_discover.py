@@ -120,10 +120,22 @@ def test_a_source_that_fails_is_a_line_on_standard_error(tmp_path: Path) -> None
     assert [problem["source"] for problem in answer["problems"]] == ["ble"]
 
 
-@pytest.mark.parametrize("place", ["example.org", "10.0.0", "10.0.0.255:", "10.0.0.255:x"])
+@pytest.mark.parametrize(
+    "place", ["example.org", "10.0.0", "10.0.0.255:", "10.0.0.255:x", "10.0.0.255:65536", "10.0.0.255:-1"]
+)
 def test_where_to_ask_must_be_an_address(place: str) -> None:
     done = CliRunner().invoke(cli, ["discover", "--source", "serial", "--broadcast", place])
     assert done.exit_code == (0 if place.endswith(":") else 2)
+
+
+@pytest.mark.parametrize(
+    "arguments", [["discover", "--timeout"], ["monitor", "--rate"], ["demo", "--speed"], ["wifi", "lab", "--search"]]
+)
+@pytest.mark.parametrize("number", ["nan", "0", "-1", "soon"])
+def test_a_number_above_0_is_one(arguments: list[str], number: str) -> None:
+    done = CliRunner().invoke(cli, [*arguments, number])
+    assert done.exit_code == 2
+    assert f"Invalid value for '{arguments[-1]}'" in done.output
 
 
 def test_the_table_says_what_is_known() -> None:
@@ -216,13 +228,14 @@ async def test_an_arm_that_is_not_found_is_not_made_up(on_usb: Simulation) -> No
     [
         (["cell"], "", "no password"),
         (["cell"], "\nsecret\n", "no password"),
+        (["cell"], b"\xff\n", "no utf-8 text"),
         (["cell", "--open", "--gateway", "10.0.0.1"], "", "DHCP"),
         (["cell", "--open", "--address", "10.0.0.x"], "", "10.0.0.x"),
         (["cell", "secret"], "", "unexpected extra argument"),
         (["x" * 33, "--open"], "", "33 bytes"),
     ],
 )
-def test_wrong_usage_sets_nothing_up(arguments: list[str], text: str, message: str) -> None:
+def test_wrong_usage_sets_nothing_up(arguments: list[str], text: str | bytes, message: str) -> None:
     done = CliRunner().invoke(cli, ["--url", "sim:", "wifi", *arguments], input=text)
     assert done.exit_code == 2
     assert message in done.stderr

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import shutil
 import signal
 import subprocess
-import sys
-import threading
-from asyncio.subprocess import PIPE, Process
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, suppress
 
 import pytest
 from bridge_rig import bridged, until
-from zenoh_rig import endpoint, place, warm_up
+from zenoh_rig import endpoint, line, place, processes_ended, program, warm_up
 
 from dobot_async import ConnectionLost, Magician, MotionUnknown
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 TCP = "tcp://127.0.0.1:0"
-IN_TIME = 20.0
 MOVER = """
 import asyncio, sys
 from dobot_async import Magician
@@ -46,11 +40,8 @@ def runtime() -> None:
 
 @pytest.fixture(autouse=True)
 def ended() -> Iterator[None]:
-    """Lets the threads end with which asyncio waits for processes; they outlive these for a moment."""
     yield
-    for thread in threading.enumerate():
-        if thread.name.startswith("asyncio-waitpid"):
-            thread.join(1)
+    processes_ended()
 
 
 @pytest.fixture
@@ -59,33 +50,9 @@ async def sim() -> AsyncIterator[Simulation]:
         yield simulation
 
 
-@asynccontextmanager
-async def program(*arguments: str, before: tuple[str, ...] = ()) -> AsyncIterator[Process]:
-    process = await asyncio.create_subprocess_exec(
-        *before,
-        *(sys.executable, "-W", "error", *arguments),
-        stdout=PIPE,
-        stderr=PIPE,
-        env={name: value for name, value in os.environ.items() if not name.startswith(("DOBOT", "ZENOH"))},
-    )
-    try:
-        yield process
-    finally:
-        with suppress(ProcessLookupError):
-            process.kill()
-
-        await process.communicate()
-
-
 def served(arm: str, *options: str, name: str = "left", json_answer: bool = False) -> tuple[str, ...]:
     """The arguments of a server."""
     return "-m", "dobot_async", *(["--json"] if json_answer else []), "serve", "--name", name, *options, arm
-
-
-async def line(process: Process) -> str:
-    assert process.stdout
-    async with asyncio.timeout(IN_TIME):
-        return (await process.stdout.readline()).decode().strip()
 
 
 async def test_it_prints_where_it_is_and_what_happens_and_ends_with_ctrl_c(sim: Simulation) -> None:

@@ -23,6 +23,7 @@ from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.models import MODELS
 from dobot_async.simulator import MyCobotQuirks, Simulation, simulate
+from dobot_async.wire import Command
 
 OLD = MyCobotQuirks(acknowledges=False, later=False)
 HERE = (30.0, -20.0, 40.0, -10.0, 20.0, 60.0)
@@ -361,11 +362,51 @@ async def test_an_arm_that_says_nothing_of_it_is_not_believed_to_have_moved() ->
 
 
 @virtual
+async def test_what_a_model_cannot_do_is_refused_before_it_is_queued() -> None:
+    async with simulate("mypalletizer260") as sim, MyCobot.connect(sim.url, model="mypalletizer260") as arm:
+        refused: list[tuple[Command[Any, Any], Any]] = [
+            (c.SEND_ANGLE, c.JointMove(1, 170)),
+            (c.JOG_ABSOLUTE, c.JointMove(2, -5)),
+            (c.JOG_INCREMENT, c.JointMove(5, 1)),
+            (c.SEND_COORD, c.CoordMove(5, 0)),
+        ]
+        for command, value in refused:
+            with pytest.raises(ValueError, match=r"myPalletizer 260|must be in"):
+                await arm.queue.put(command, value)
+
+        with pytest.raises(ValueError, match="the axes 1 to 4"):
+            await arm.jog("ry+", 1)
+
+        with pytest.raises(ValueError, match="joints 1 to 4"):
+            await arm.jog("j5+", 1)
+
+        await arm.queue.put(c.SEND_ANGLE, c.JointMove(1, 10))
+        await arm.queue.join()
+        assert sim.arm.joints[0] == pytest.approx(10, abs=0.1)
+
+
+@virtual
+async def test_servos_are_let_go_damped_unless_told_otherwise() -> None:
+    async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
+        sent: list[bytes] = []
+        arm.link.trace = lambda outgoing, frame: sent.append(bytes(frame)) if outgoing else None
+        await arm.release()
+        await arm.release(damping=False)
+        await arm.release(2)
+        await arm.release(2, damping=False)
+        told = [frame.hex(" ") for frame in sent if frame[3] in (0x13, 0x56)]
+        assert told == ["fe fe 02 13 fa", "fe fe 03 13 01 fa", "fe fe 03 56 02 fa", "fe fe 04 56 02 01 fa"]
+
+
+@virtual
 async def test_servos_that_cannot_be_read_are_an_alarm_and_no_angle() -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
         sim.arm.servos_lost = True
         with pytest.raises(ArmAlarm, match="SERVO_LOSS"):
             await arm.get_angles()
+
+        with pytest.raises(ArmAlarm, match="SERVO_LOSS"):
+            await arm.get_pose()
 
         with pytest.raises(ArmAlarm, match="SERVO_LOSS"):
             await arm.move_joint(1, 90)
@@ -535,15 +576,11 @@ async def test_wrong_arguments_are_refused_before_a_byte_is_sent() -> None:
             (arm.move_elbow(10), "has no SetSolutionAngles"),
             (arm.request(c.SEND_ANGLES, c.JointsMove((0,) * 6)), "goes through the queue"),
             (arm.queue.wait(float("nan")), "seconds"),
+            (arm.move_joint(1, 200), "joint 1 must be in"),
+            (arm.queue.step_joint(7, 1), "joints 1 to 6"),
         ):
             with pytest.raises(ValueError, match=message):
                 await act
-
-        with pytest.raises(ValueError, match="joint 1 must be in"):
-            arm.move_joint(1, 200)
-
-        with pytest.raises(ValueError, match="joints 1 to 6"):
-            arm.queue.step_joint(7, 1)
 
         assert sim.arm.counters.requests == requests
 

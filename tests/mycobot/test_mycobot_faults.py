@@ -3,80 +3,26 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
 import pytest
+from bad_line import BadLine, Spoil, bad_lines
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from virtual import run_virtual, virtual
 
-from dobot_async import family
 from dobot_async.errors import CommandRejected, ConnectionLost, DobotError, ReplyTimeout
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.frame import Frame, encode
 from dobot_async.simulator import Faults, MyCobotQuirks, Simulation, simulate
-from dobot_async.transports import Transport
-
-Spoil = Callable[[bytes], list[tuple[float, bytes]]]
-
-
-class BadLine:
-    """A line to a simulation in memory on which a test decides what becomes of each message."""
-
-    in_flight = window = 1
-    disorder = 0.0
-
-    def __init__(self, inner: Transport) -> None:
-        self.request: Spoil = lambda data: [(0, data)]
-        self.reply: Spoil = lambda data: [(0, data)]
-        self._inner = inner
-        self._arrived: asyncio.Queue[bytes] = asyncio.Queue()
-        self._pump = asyncio.create_task(self._read())
-
-    async def _read(self) -> None:
-        loop = asyncio.get_running_loop()
-        while True:
-            message = await self._inner.receive()
-            for delay, data in self.reply(message):
-                loop.call_later(delay, self._arrived.put_nowait, data)
-
-    async def send(self, data: bytes) -> None:
-        """Sends what is left of a message."""
-        for _, each in self.request(data):
-            await self._inner.send(each)
-
-    async def receive(self) -> bytes:
-        """Returns the next message that has arrived."""
-        return await self._arrived.get()
-
-    async def aclose(self) -> None:
-        """Closes the line."""
-        self._pump.cancel()
-        await asyncio.wait([self._pump])
-        await self._inner.aclose()
 
 
 @pytest.fixture
 def lines(monkeypatch: pytest.MonkeyPatch) -> list[BadLine]:
     """The bad lines over which `sim://` is reached from now on."""
-    return made(monkeypatch)
-
-
-def made(patch: pytest.MonkeyPatch) -> list[BadLine]:
-    """As the fixture `lines`, for a test that makes its own."""
-    from dobot_async.transports import open_transport
-
-    found: list[BadLine] = []
-
-    async def opened(url: str, *, arm: str) -> Transport:
-        found.append(BadLine(await open_transport(url, arm=arm)))
-        return found[-1]
-
-    patch.setattr(family, "open_transport", opened)
-    return found
+    return bad_lines(monkeypatch)
 
 
 def of(number: int, become: Spoil) -> Spoil:
@@ -117,7 +63,7 @@ async def test_no_acknowledgement_makes_a_motion_run_twice(lines: list[BadLine],
 async def test_late_acknowledgements_are_swallowed(lines: list[BadLine]) -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
         lines[0].reply = of(c.SEND_ANGLE.id, lambda data: [(1.0, data)])
-        for angle in (40.0, -40.0):
+        for angle in (90.0, -90.0):  # so far that each takes longer than its acknowledgement
             await arm.move_joint(1, angle)
 
         await asyncio.sleep(2)
@@ -220,7 +166,7 @@ READINGS = ("get_angles", "get_coords", "get_encoders", "get_voltages", "is_movi
 def test_a_reply_in_pieces_and_among_noise_is_the_same(cuts: list[int], noise: list[bytes]) -> None:
     async def compare() -> None:
         with pytest.MonkeyPatch.context() as patch:
-            bad = made(patch)
+            bad = bad_lines(patch)
             async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
                 sim.arm.place(10, -20, 30, -40, 50, -60)
                 whole = [await getattr(arm, name)() for name in READINGS]

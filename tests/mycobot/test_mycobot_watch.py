@@ -44,6 +44,37 @@ def test_one_still_look_on_the_way_is_no_arrival() -> None:
     assert last(lambda now: (10.0, abs(now - 0.5) > 0.01 and now < 1))[0] > 1.0
 
 
+def test_the_end_of_a_fast_motion_is_believed_at_the_first_still_look() -> None:
+    now, verdict = last(lambda now: (min(40 * now, 10), now < 0.25))
+    assert verdict is Verdict.ARRIVED
+    assert now == pytest.approx(0.3), "0.25 is the first look at which it is there, and 0.3 the one that is the same"
+
+
+def test_a_fast_arm_that_is_there_needs_its_flag_alone() -> None:
+    watch = Watch(GOAL, 0.0)
+    for now, angle, settled in ((0.0, 0.0, False), (0.1, 6.0, False), (0.2, 9.5, False), (0.25, 9.6, True)):
+        watch.look(now, [angle], moving=True)
+        assert watch.settled is settled
+
+    watch.look(0.3, [5.0], moving=True)
+    assert not watch.settled
+
+
+def test_a_creeping_arm_has_to_stand_still_twice() -> None:
+    creep = verdicts(lambda now: (9 + now, abs(now - 0.5) > 0.01 and now < 1), 10)
+    assert creep[-1][0] > 1.0, "one look without its flag, on its way and near its goal, is not believed"
+
+
+def test_the_end_is_expected_where_its_speed_leads() -> None:
+    watch = Watch(GOAL, 0.0)
+    for now, angle in ((0.0, 0.0), (0.1, 2.0), (0.2, 4.0)):
+        watch.look(now, [angle], moving=True)
+
+    assert watch.ends_at == pytest.approx(0.5)
+    watch.look(0.3, [3.0], moving=True)
+    assert math.isinf(watch.ends_at), "it goes away from it"
+
+
 def test_it_need_not_move_to_be_there() -> None:
     now, verdict = last(lambda _: (10.5, False))
     assert verdict is Verdict.ARRIVED
@@ -92,7 +123,7 @@ def test_no_reading_makes_an_arm_arrive_that_is_not_there(angles: list[float]) -
     found = [watch.look(number * STEP, [angle], moving=False) for number, angle in enumerate(angles)]
     for place, verdict in enumerate(found):
         if verdict is Verdict.ARRIVED:
-            assert all(abs(angle - 10) <= 2.5 for angle in angles[place - 3 : place + 1])
+            assert all(abs(angle - 10) <= 2.5 for angle in angles[place - 1 : place + 1])
             break
 
 

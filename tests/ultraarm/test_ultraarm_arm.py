@@ -24,6 +24,7 @@ from dobot_async import (
 )
 from dobot_async.simulator import DeviceOptions, Faults, Simulation, UltraArmQuirks, simulate
 from dobot_async.simulator.ultraarm import ULTRAARM
+from dobot_async.transports import Transport, open_transport
 from dobot_async.ultraarm import commands as c
 from dobot_async.wire import Command
 
@@ -499,6 +500,27 @@ async def test_a_queued_command_that_is_refused() -> None:
 
         await arm.move_to(200, 0, 40)
         assert targets(sim) == [200]
+
+
+@virtual
+async def test_what_the_way_to_the_arm_takes_is_not_taken_from_its_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def slowly(url: str, arm: str) -> Transport:
+        await asyncio.sleep(4.999)
+        return await open_transport(url, arm=arm)
+
+    monkeypatch.setattr("dobot_async.family.open_transport", slowly)
+    async with UltraArm.connect("sim:?latency=0.05", timeout=5) as arm:
+        assert await arm.get_queue_size() == 0
+
+
+@virtual
+async def test_a_jog_that_is_wrong_sends_nothing() -> None:
+    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url) as arm:
+        requests = sim.arm.counters.requests
+        with pytest.raises(ValueError, match="must be in"):
+            await arm.jog(UltraArmJog.Z_MINUS, 0.5, speed=1000)
+
+        assert sim.arm.counters.requests == requests
 
 
 @virtual

@@ -1,0 +1,31 @@
+"""What other places need of the Magician, and where it is; imports none of it."""
+
+from __future__ import annotations
+
+from dobot_async.families import Family
+
+__all__ = ["FAMILY"]
+
+FAMILY = Family(
+    public={
+        "dobot_async.magician.alarms": ("Alarm",),
+        "dobot_async.magician.arm": ("DeviceInfo", "Jog", "Magician"),
+        "dobot_async.magician.effectors": ("Gripper", "Laser", "Pen", "SuctionCup"),
+        "dobot_async.magician.kinematics": ("JointLimits", "Kinematics", "Unreachable"),
+        "dobot_async.magician.params": (
+            "ColorPort",
+            "EndEffectorParams",
+            "HHTTrigMode",
+            "InfraredPort",
+            "IOFunction",
+            "Pose",
+            "PTPMode",
+            "TriggerADCCondition",
+        ),
+    },
+    simulator="dobot_async.simulator.magician:SimulatedMagician",
+    bridge="dobot_async.magician.bridged:BRIDGED",
+    discovery="dobot_async.discovery.families:MAGICIAN",
+    cli="dobot_async.cli.families:MAGICIAN",
+    fleet="dobot_async.fleet.families:MAGICIAN",
+)
