@@ -356,6 +356,8 @@ class MotionQueue:
             try:
                 await self._executor.connected()
                 await self._observe(alarms=alarms)
+                self._crowded = False
+                self._tell()
                 pause = await self._pause()
             except ReplyTimeout as error:
                 self.fail(ConnectionLost(f"the arm no longer answers: {error}"))
@@ -364,8 +366,6 @@ class MotionQueue:
             except DobotError as error:
                 self.fail(error)
 
-            self._crowded = False
-            self._tell()
             await asyncio.sleep(max(pause, now + DENSE - clock()))
 
     async def _pause(self) -> float:

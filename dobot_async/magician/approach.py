@@ -33,7 +33,8 @@ class Approach:
         self._look = look
         self._clock = clock
         self._entry: Entry | None = None
-        self._began_at = self._looked_at = 0.0
+        self._began_at: float | None = None
+        self._looked_at = 0.0
         self._way = self._left = 0.0
         self._until: float | None = None
         self._again_at = 0.0
@@ -53,10 +54,12 @@ class Approach:
         """Takes how far the arm still has to go."""
         now = self._clock()
         if entry is not self._entry or left > self._way - STEP:
-            self._entry, self._began_at, self._way = entry, now, left
+            self._entry, self._began_at, self._way = entry, None, left
             self._until, self._again_at = None, now + STANDING
         elif left > self._way / 2:
-            self._until, self._again_at = now + (now - self._began_at), now + (now - self._began_at) / 2
+            self._began_at = now if self._began_at is None else self._began_at  # it cannot have begun later
+            least = now - self._began_at
+            self._until, self._again_at = now + least, now + least / 2
         else:
             gone = self._left - left
             least = left * (now - self._looked_at) / gone if gone > STEP else 0.0
