@@ -24,7 +24,7 @@ from dobot_async import Magician
 from dobot_async.simulator import simulate
 
 ROUNDS = 2
-BATCH = 100
+BATCH = 500
 OUT, BACK = 23 * BITS / BAUD, 14 * BITS / BAUD
 WINDOWS = (1, 4, 8, 16)
 FEW = (1, 4)
