@@ -16,7 +16,7 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import AsyncIterator, Collection, Coroutine, Generator, Iterator, Mapping, Sequence
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from typing import Any, TypeVar
 
 import anyio
@@ -112,6 +112,7 @@ class MotionQueue:
         self._watchers = 0
         self._crowded = False
         self._poller: asyncio.Task[None] | None = None
+        self._stirred = asyncio.Event()
         self._observed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
     @property
@@ -232,6 +233,7 @@ class MotionQueue:
 
     def _end_all(self, error: DobotError, under_way: Collection[Entry]) -> None:
         """Ends all Motions that are pending or under way."""
+        self._stirred.set()
         pending, self._pending = self._pending, deque()
         for motion in pending:
             motion.end(error)
@@ -348,6 +350,7 @@ class MotionQueue:
         clock = asyncio.get_running_loop().time
         alarms_at = -math.inf
         while self._watchers:
+            self._stirred.clear()
             now, pause = clock(), POLL
             alarms = now >= alarms_at + ALARMS
             if alarms:
@@ -366,7 +369,17 @@ class MotionQueue:
             except DobotError as error:
                 self.fail(error)
 
-            await asyncio.sleep(max(pause, now + DENSE - clock()))
+            await self._rest(max(pause, now + DENSE - clock()))
+
+    async def _rest(self, seconds: float) -> None:
+        """Leaves the arm alone, until what it was to do is thrown away: it may have something shorter to do then."""
+        await asyncio.sleep(min(seconds, POLL))
+        if seconds <= POLL:
+            return
+
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds - POLL):
+                await self._stirred.wait()
 
     async def _pause(self) -> float:
         """Returns how long the arm may be left alone: half of what the next motion needs at the least."""

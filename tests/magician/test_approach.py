@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from virtual import virtual
 
-from dobot_async import Magician, PTPMode
+from dobot_async import Magician, MotionStopped, PTPMode
 from dobot_async.executor import Entry
 from dobot_async.magician import commands as c
 from dobot_async.magician.approach import Approach
@@ -132,3 +132,19 @@ async def test_an_arm_that_was_paused_is_waited_for() -> None:
         await arm.queue.resume()
         await waiting
         assert asyncio.get_running_loop().time() <= sim.arm.executed[-1].finished + 2 * DENSE
+
+
+@virtual
+async def test_what_is_put_behind_a_stop_is_not_left_alone_for_the_sake_of_what_was_stopped() -> None:
+    async with simulate() as sim, Magician.connect(sim.url) as arm:
+        await arm.move_to(200, 0, 40)
+        long = await arm.queue.move_to(200, 250, 40)
+        waiting = asyncio.create_task(long.wait())
+        await asyncio.sleep(0.5)
+        await arm.queue.clear()
+        with pytest.raises(MotionStopped):
+            await waiting
+
+        await arm.queue.wait(0.01)
+        await arm.queue.join()
+        assert asyncio.get_running_loop().time() <= sim.arm.executed[-1].finished + 2 * POLL

@@ -207,7 +207,7 @@ def check_fate(record: Record, fate: Fate, found: Sequence[Executed], plan: Plan
         ensure(stopped, f"nobody stopped it: {fate} {record.stops}")
 
     if plan.severity == "none" and done and fate.watched:
-        slack = POLL + 24 * (plan.faults.latency + 2 * plan.disorder) + TINY
+        slack = POLL + 30 * (plan.faults.latency + 2 * plan.disorder) + TINY
         ensure(
             done[0].finished / record.speed >= fate.ended - slack, f"it was done, and not said to be: {fate}, {done}"
         )
