@@ -174,7 +174,7 @@ class SerialTransport(asyncio.Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Called once, when the port is gone or closed."""
-        self._cause = exc
+        self._cause = exc or self._cause
         self._lost.set_result(None)
         self._writable.set()
         self._wake()
@@ -204,8 +204,12 @@ class SerialTransport(asyncio.Protocol):
 
         try:
             return data[os.write(self._transport.serial.fd, data) :]
-        except OSError:
-            return data  # whatever it is, the transport finds it as well, and ends for it
+        except BlockingIOError:
+            return data
+        except OSError as error:
+            self._cause = error  # pyserial-asyncio would find the same, and print it
+            self._abort()
+            return b""
 
     def _wake(self) -> None:
         if self._arrived and not self._arrived.done():
