@@ -360,10 +360,13 @@ class Magician(Verbs[Awaitable[None]]):
 
     async def _leave(self) -> None:
         """Stops the arm and everything on it, as far as the link still allows."""
-        with suppress(TimeoutError):
+        with suppress(TimeoutError, DobotError):
             async with asyncio.timeout(LEAVE_TIMEOUT):
                 requests = (self.link.request(command, value, urgent=True) for command, value in LEAVING)
                 await asyncio.gather(*requests, return_exceptions=True)
+                # Who found out meanwhile what had become of a command may have queued a WAIT for its index.
+                await self.queue.aclose()
+                await self.link.request(c.SET_QUEUED_CMD_CLEAR, None, urgent=True)
 
     async def _close(self) -> None:
         await self.queue.aclose()
