@@ -7,6 +7,7 @@ known of the rest to tell whether the arm moves on behalf of a program that has 
 from __future__ import annotations
 
 import enum
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
@@ -156,7 +157,7 @@ class Bridged(Protocol[F]):
         """Returns what a client is told whose request is not passed on; nothing if the protocol has no word for it."""
 
 
-class ByKey(Generic[F]):
+class ByKey(ABC, Generic[F]):
     """A family whose answers tell by their keys whose they are, and which has no word for a refusal."""
 
     in_order = False
@@ -167,9 +168,9 @@ class ByKey(Generic[F]):
         """Nothing else than `stopping`."""
         return self.stopping
 
+    @abstractmethod
     def parser(self) -> Parser[F]:
         """Returns a parser for one stream."""
-        raise NotImplementedError
 
     def requests(self) -> Parser[F]:
         """Returns a parser for what a client sends, which looks like what the arm sends."""
