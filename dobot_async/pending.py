@@ -11,16 +11,16 @@ A tombstone stands in line for the replies that requests are still owed, and swa
 would answer the next request of its key with wrong data; with it, at the worst, a good reply is swallowed in the place
 of a lost one and its request is sent again, at once. What is owed ends
 
-- when a request that was sent later, of whatever key, is answered: replies come in order, so this one was lost. But of
-  each line one reply may yet be a straggler, that came to be late alone: it is recognised for `linger` seconds;
+- when a request that was sent later, of whatever key, is answered: replies come in order, so this one was lost. But it
+  may yet be a straggler, that came to be late alone: it is recognised for `linger` seconds;
 - `linger` seconds after its request; a peer that has just shown that it pauses for longer is given twice as long.
 
 Where a straggler may come, a call can `hold` its replies until something that was asked behind it is answered: one by
 then is the right one, of two nothing tells which is.
 
-So any number of replies may be late together, as when the peer pauses, and one of each key alone, and still none
-answers a later request. On a link with `disorder` "later" means later by that much, and a reply so close behind another
-of its key that it may be a second copy answers nobody.
+So any number of replies may be late, together, as when the peer pauses, or alone, and still none answers a later
+request. On a link with `disorder` "later" means later by that much, of each key only the last straggler is recognised,
+and a reply so close behind another of its key that it may be a second copy answers nobody.
 """
 
 from __future__ import annotations
@@ -180,12 +180,8 @@ class Pending(Generic[F]):
 
         if any(not sent.waiter.deliver for sent in line):
             now = self.clock()
-            stragglers: dict[Hashable, Sent[F]] = {}
-            for sent in line:
-                if sent.passed <= now and not sent.waiter.deliver:
-                    stragglers[sent.waiter.echo] = sent  # the latest, for each is awaited for as long
-
-            line[:] = [sent for sent in line if sent.waiter.deliver or self._stands(sent, now, stragglers)]
+            latest = {sent.waiter.echo: sent for sent in line if sent.passed <= now and not sent.waiter.deliver}
+            line[:] = [sent for sent in line if sent.waiter.deliver or self._stands(sent, now, latest)]
 
         if not line:
             del self._lines[key]
@@ -284,12 +280,13 @@ class Pending(Generic[F]):
                 if sent.number < answered.number and sent.at <= answered.at - disorder:
                     sent.passed = min(sent.passed, passed)
 
-    def _stands(self, sent: Sent[F], now: float, stragglers: dict[Hashable, Sent[F]]) -> bool:
+    def _stands(self, sent: Sent[F], now: float, latest: dict[Hashable, Sent[F]]) -> bool:
         """Whether a tombstone is still needed."""
-        if sent.passed <= now:
-            return sent is stragglers[sent.waiter.echo] and sent.straggles > now
+        if sent.passed > now:
+            return sent.until > now
 
-        return sent.until > now
+        # Where much is lost and nothing is proven, to wait for more than the latest would cost each call a reply more.
+        return sent.straggles > now and (not self._disorder() or sent is latest[sent.waiter.echo])
 
 
 class Waiter(Generic[F]):

@@ -78,8 +78,18 @@ FENCES = (
     c.GET_PTP_COMMON_PARAMS,
     c.GET_JOG_COMMON_PARAMS,
     c.GET_CP_PARAMS,
+    c.GET_PTP_JUMP_PARAMS,
+    c.GET_ARC_PARAMS,
+    c.GET_HHT_TRIG_MODE,
+    c.GET_END_EFFECTOR_LASER,
+    c.GET_END_EFFECTOR_SUCTION_CUP,
+    c.GET_END_EFFECTOR_GRIPPER,
+    c.GET_HOME_PARAMS,
+    c.GET_PTP_COORDINATE_PARAMS,
 )
-"""Cheap to answer, and seldom asked: which answers are still to come shows by whether these have come."""
+"""Cheap to answer, and seldom asked: which answers are still to come shows by whether these have come.
+
+So many, because one that is lost itself is of no use until its answer cannot come any more."""
 
 
 @dataclass(frozen=True, slots=True)
