@@ -65,15 +65,26 @@ async def read(running: Bridge[Any], happened: list[BridgeEvent]) -> None:
 
 
 class Plain:
-    """A client that sends and receives frames, and nothing else."""
+    """A client that sends and receives frames, and nothing else.
+
+    Attributes:
+        transport: Its own.
+        poured: How often it has sent what need not be frames.
+    """
 
     def __init__(self, transport: Transport) -> None:
         self.transport = transport
+        self.poured = 0
         self._parser = Parser()
         self._frames: list[Frame] = []
 
     async def send(self, *frames: Frame) -> None:
         await self.transport.send(b"".join(map(encode, frames)))
+
+    async def pour(self, data: bytes) -> None:
+        """Sends bytes of any kind."""
+        await self.transport.send(data)
+        self.poured += 1
 
     async def receive(self) -> Frame:
         """The next frame."""

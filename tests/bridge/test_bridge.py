@@ -125,14 +125,13 @@ async def test_the_late_answer_to_somebody_who_has_gone_answers_nobody() -> None
         async with client(rig.url) as plain:
             await plain.ask(c.GET_DEVICE_NAME)
             rig.sim.faults.latency = 0.1
+            requests = rig.sim.arm.counters.requests
             await plain.send(ask(c.GET_DEVICE_NAME))
-            await asyncio.sleep(0.05)
+            await until(lambda: rig.sim.arm.counters.requests > requests)
 
+        rig.sim.arm.state.set(c.SET_DEVICE_NAME, "new")  # the old name is on its way
         async with client(rig.url) as plain:
-            await plain.send(ask(c.GET_DEVICE_NAME))
-            await asyncio.sleep(0.07)
-            rig.sim.arm.state.set(c.SET_DEVICE_NAME, "new")
-            assert (await plain.receive()).params == b"new\0"
+            assert (await plain.ask(c.GET_DEVICE_NAME)).params == b"new\0"
 
 
 async def test_what_fits_no_request_is_left_out_and_the_next_is_answered() -> None:
@@ -189,7 +188,7 @@ async def test_a_refusal_is_told_once_however_often_it_is_asked() -> None:
         await first.receive()
         await second.send(*[CLEAR] * 20)
         assert await second.hears_nothing()
-        await asyncio.sleep(0.01)
+        await until(lambda: rig.told("refused"))
         assert len(rig.told("refused")) == 1
 
 
@@ -217,8 +216,9 @@ async def test_what_is_asked_after_a_command_is_asked_after_it() -> None:
     async with bridged() as rig, client(rig.url) as first, client(rig.url) as second:
         await first.ask(c.SET_QUEUED_CMD_STOP_EXEC)
         rig.sim.faults.latency = 0.05
+        sent = rig.bridge.link.stats.sent
         await second.send(ask(c.GET_PTP_COMMON_PARAMS))
-        await asyncio.sleep(0.02)
+        await until(lambda: rig.bridge.link.stats.sent > sent)
         await first.send(ask(c.SET_PTP_COMMON_PARAMS, c.PTPCommonParams(50, 50), queued=True))
         await first.send(ask(c.GET_QUEUED_CMD_LEFT_SPACE))
         assert (await first.receive()).id == c.SET_PTP_COMMON_PARAMS.id
@@ -306,8 +306,8 @@ async def test_a_stop_overtakes_and_drops_what_waits() -> None:
             ids.append((await plain.receive()).id)
 
         assert await plain.hears_nothing()
-        await asyncio.sleep(0.1)
         assert rig.sim.arm.device.left_space >= 31
+        await until(lambda: rig.told("refused"))
         assert len(rig.told("refused")) == 1
 
 
@@ -391,7 +391,8 @@ async def test_the_line_to_the_arm_is_mended_and_no_motion_sent_twice() -> None:
 
         async def break_it() -> None:
             for _ in range(8):
-                await asyncio.sleep(0.05)
+                enough = rig.sim.arm.counters.requests + 7
+                await until(lambda: rig.sim.arm.counters.requests >= enough)  # noqa: B023 - awaited in here
                 rig.sim.unplug()
 
         breaking = asyncio.create_task(break_it())
@@ -407,8 +408,9 @@ async def test_what_was_sent_before_an_outage_is_not_sent_after_it() -> None:
     async with bridged(speed=1.0) as rig, client(rig.url) as plain:
         await plain.ask(c.SET_QUEUED_CMD_START_EXEC)
         rig.sim.faults.stalled = True
+        sent = rig.bridge.link.stats.sent
         await plain.send(far(), ask(c.GET_DEVICE_NAME))
-        await asyncio.sleep(0.05)
+        await until(lambda: rig.bridge.link.stats.sent == sent + 2)
         rig.sim.unplug()
         await until(lambda: rig.bridge.link.outages)
         rig.sim.faults.stalled = False
@@ -430,7 +432,7 @@ async def test_who_vanishes_while_the_arm_is_out_of_reach_stops_it_afterwards() 
             rig.sim.faults.stalled = True
             rig.sim.unplug()
 
-        await asyncio.sleep(0.1)
+        await until(lambda: rig.told("link"))
         assert rig.sim.arm.device.moving
         rig.sim.faults.stalled = False
         await until(lambda: rig.told("stopped"))
@@ -467,19 +469,19 @@ def has_told(rig: Rig, what: str, times: int) -> bool:
 async def flood(plain: Plain) -> None:
     data = encode(ask(c.GET_POSE)) * 500
     while True:
-        await plain.transport.send(data)
+        await plain.pour(data)
 
 
 async def talk_garbage(plain: Plain) -> None:
     data = bytes(range(256)) + b"\xaa\xaa\x03" * 100
     while True:
-        await plain.transport.send(data)
+        await plain.pour(data)
 
 
 async def say_half(plain: Plain) -> None:
     half = encode(far())[:-4]
     while True:
-        await plain.transport.send(half)
+        await plain.pour(half)
         await asyncio.sleep(0.001)
 
 
@@ -491,7 +493,7 @@ async def test_who_misbehaves_disturbs_nobody_else(listen: str, misbehave: Any) 
         bad = await stack.enter_async_context(client(rig.bridge.urls[1]))
         disturbing = asyncio.create_task(misbehave(bad))
         try:
-            await asyncio.sleep(0.05)
+            await until(lambda: bad.poured >= 3)
             await good.read(50)
         finally:
             disturbing.cancel()
