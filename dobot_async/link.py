@@ -223,24 +223,29 @@ class Link(Generic[F]):
             if not urgent:
                 self._turns.give(frame.key)
 
-    def shout(self, command: Command[None, Any]) -> None:
-        """Sends a command before this returns, if the transport can; nobody hears of its answer.
+    def shout(self, frame: F) -> Callable[[], None]:
+        """Sends what `frame` made of a command before this returns, if the transport can; nobody hears of its answer.
 
         For a stop, which many links are to carry at once: all of them are told before any is waited for. Whether it has
         arrived is for a `request` of the same to find out, so it must be harmless twice.
-        """
-        if self._read_only or self.disorder or not self.open:
-            return
 
-        frame = self.frame(command, None)
-        if self._write(bytes(frame)):
-            waiter = self._pending.expect(frame.key, lambda _: None)
-            waiter.listen(lambda _: None)
-            waiter.sent()
-            self._loop.call_later(LINGER, self._pending.leave, waiter)
-            self._stats.sent += 1
-            if self.trace:
-                self.trace(True, frame)
+        Returns:
+            What is to be called once all are told, before anything else is sent: it notes that an answer is owed.
+        """
+        if self.disorder or not self.open or not self._write(bytes(frame)):
+            return lambda: None
+
+        return partial(self._owe, frame)
+
+    def _owe(self, frame: F) -> None:
+        """Notes that a frame was sent the answer to which is for nobody."""
+        waiter = self._pending.expect(frame.key, lambda _: None)
+        waiter.listen(lambda _: None)
+        waiter.sent()
+        self._loop.call_later(LINGER, self._pending.leave, waiter)
+        self._stats.sent += 1
+        if self.trace:
+            self.trace(True, frame)
 
     async def post(
         self,

@@ -14,7 +14,7 @@ from typing import Any, Generic, Literal, Self, TypeVar
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.barriers import Barriers
 from dobot_async.fleet.claims import Party
-from dobot_async.fleet.seat import Member, Seat
+from dobot_async.fleet.seat import Member, Seat, tell_to_stop
 from dobot_async.fleet.shapes import Shape
 from dobot_async.fleet.work import end, named
 from dobot_async.fleet.zones import Zones
@@ -114,9 +114,7 @@ class Crew(Generic[A]):
         self._barriers.fail(failed.name, str(error))
         affected = [seat for seat in self._affected(failed.name) if not seat.stopped]
         others = [seat for seat in affected if seat is not failed]
-        for seat in others:
-            seat.shout()
-
+        tell_to_stop(others)
         if failed in affected:
             failed.stopped = MotionStopped(f"{failed.name} does not move, for it has failed: {error}")
 

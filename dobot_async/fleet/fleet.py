@@ -23,7 +23,7 @@ from dobot_async.fleet.claims import Party
 from dobot_async.fleet.crew import Crew, OnFailure
 from dobot_async.fleet.families import AnyArm
 from dobot_async.fleet.frames import BaseFrame, Place
-from dobot_async.fleet.seat import Member, Seat
+from dobot_async.fleet.seat import Member, Seat, tell_to_stop
 from dobot_async.fleet.shapes import Shape
 from dobot_async.fleet.together import Together, abandon, launch
 from dobot_async.fleet.work import all_of, named, side_by_side
@@ -199,9 +199,7 @@ class Fleet(Crew[A]):
         Raises:
             DobotError: An arm could not be stopped; the others were.
         """
-        for seat in self._seats.values():
-            seat.shout()
-
+        tell_to_stop(self._seats.values())
         await undisturbed(all_of({name: seat.stop() for name, seat in self._seats.items()}))
 
     async def recover(self) -> None:

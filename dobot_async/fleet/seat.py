@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Mapping
 from contextlib import ExitStack, asynccontextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
@@ -23,7 +23,7 @@ from dobot_async.fleet.work import named
 from dobot_async.fleet.zones import Zones, here
 from dobot_async.motion import Motion
 
-__all__ = ["Member", "Seat"]
+__all__ = ["Member", "Seat", "tell_to_stop"]
 
 A = TypeVar("A")
 
@@ -61,6 +61,12 @@ class Member(Generic[A]):
             raise ValueError("limits are kept by the guard, and of a Magician alone: the ways of others are not known")
 
 
+def tell_to_stop(seats: Iterable[Seat]) -> None:
+    """Tells arms to stop before this returns: all of them before anything is noted of one. `stop` is to follow."""
+    for owed in [seat.shout() for seat in seats]:
+        owed()
+
+
 class Seat:
     """The place of one arm in its fleet; the `Overseer` of its queue.
 
@@ -96,6 +102,7 @@ class Seat:
         self._commanding: tuple[Party, ...] = ()
         self._halts = 0
         self._halted: DobotError = MotionStopped("the arm was stopped")
+        self._halting: Any = None  # the frame that stops the arm
         self._quiet = False
         self._tasks: set[asyncio.Task[None]] = set()
         self._follower: asyncio.Task[None] | None = None
@@ -111,6 +118,9 @@ class Seat:
         """Takes an arm that was just connected."""
         self.arm = arm
         member = self.member
+        if self.family.stop and member.options.get("control", True):
+            self._halting = arm.link.frame(self.family.stop, None)
+
         if member.guard != "off":
             self._guard = Guard(
                 self._steps,
@@ -190,10 +200,13 @@ class Seat:
         if halts is not None and halts != self._halts:
             raise self._halted.with_traceback(None)
 
-    def shout(self) -> None:
-        """Tells the arm to stop before this returns, if its link can; `stop` is to follow at once."""
-        if self.arm and self.family.stop:
-            self.arm.link.shout(self.family.stop)
+    def shout(self) -> Callable[[], None]:
+        """Tells the arm to stop before this returns, if its link can; see `Link.shout`. `stop` is to follow at once."""
+        if self._halting is None:
+            return lambda: None
+
+        owed: Callable[[], None] = self.arm.link.shout(self._halting)
+        return owed
 
     def stop(self) -> Coroutine[Any, Any, None]:
         """Returns what stops the arm; from now on none of its motions counts as done."""
