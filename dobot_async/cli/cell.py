@@ -21,6 +21,7 @@ import click
 
 from dobot_async.cli.cell_program import execute, parse_cell_program
 from dobot_async.cli.output import Output
+from dobot_async.cli.params import ABOVE_ZERO
 from dobot_async.cli.session import Session, run
 from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell, read_cell
@@ -174,7 +175,7 @@ def run_program(program: TextIO) -> None:
 
 
 @cell.command()
-@click.option("--rate", type=click.FloatRange(0, min_open=True), default=5.0, show_default=True, help="Readings/s.")
+@click.option("--rate", type=ABOVE_ZERO, default=5.0, show_default=True, help="Readings/s.")
 @click.option("--count", type=click.IntRange(1), help="End after so many readings.")
 def watch(rate: float, count: int | None) -> None:
     """Watch all arms, in place on a terminal, elsewhere some lines for each reading.
