@@ -257,18 +257,21 @@ class Pending(Generic[F]):
         line = self.line(waiter.key)
         for _ in held:
             if line:
-                self._take(line, 0)
+                self._take(line, 0, provable=True)
 
-    def _take(self, line: list[Sent[F]], place: int) -> None:
+    def _take(self, line: list[Sent[F]], place: int, *, provable: bool = False) -> None:
         """Takes a reply's place out of its line.
 
-        If nothing but a straggler could come there, either it has come, or the reply was the next one's, and the
-        straggler may yet come, but no later than before.
+        If nothing but a straggler could come there, either it has come, or the reply was that of one which is awaited
+        in its turn, and the straggler may yet come in the next one's place. That is awaited for its own time where the
+        next reply is proven to be one or the other, and else no longer than the straggler, or it would never end.
         """
-        taken = line.pop(place)
-        if place < len(line) and (taken.succeeds or taken.passed <= self.clock()):
+        taken, now = line.pop(place), self.clock()
+        if place < len(line) and (taken.succeeds or taken.passed <= now):
             heir = line[place]
-            heir.straggles, heir.succeeds = min(heir.straggles, taken.straggles), True
+            heir.succeeds = True
+            if not provable and any(sent.passed > now for sent in line[place:]):
+                heir.straggles = min(heir.straggles, taken.straggles)
 
     def _pass(self, answered: Sent[F]) -> None:
         """What was sent before something that is answered now was answered, or lost; the rest may be as late."""

@@ -705,6 +705,19 @@ def test_a_straggler_is_recognised_for_linger(
     assert later == taken
 
 
+def test_each_straggler_is_recognised_for_its_own_time(pending: Pending[Reply], clock: Clock) -> None:
+    abandon(pending)
+    clock.now = 1.4
+    abandon(pending)
+    fence(pending)
+    clock.now = 1.5
+    assert pending.resolve(Reply("pose", 0))
+    clock.now = 1.4 + LINGER - 0.001
+    assert len(pending) == 1
+    clock.now = 1.4 + LINGER
+    assert len(pending) == 0
+
+
 def test_who_succeeds_a_straggler_may_be_followed_by_it(pending: Pending[Reply], clock: Clock) -> None:
     abandon(pending)
     fence(pending)
