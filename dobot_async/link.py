@@ -223,16 +223,20 @@ class Link(Generic[F]):
             if not urgent:
                 self._turns.give(frame.key)
 
-    def shout(self, frame: F) -> Callable[[], None]:
+    def shout(self, frame: F, data: bytes) -> Callable[[], None]:
         """Sends what `frame` made of a command before this returns, if the transport can; nobody hears of its answer.
 
         For a stop, which many links are to carry at once: all of them are told before any is waited for. Whether it has
         arrived is for a `request` of the same to find out, so it must be harmless twice.
 
+        Args:
+            frame: The frame.
+            data: Its bytes, made when there was time for it.
+
         Returns:
             What is to be called once all are told, before anything else is sent: it notes that an answer is owed.
         """
-        if self.disorder or not self.open or not self._write(bytes(frame)):
+        if self.disorder or not self._write(data):
             return lambda: None
 
         return partial(self._owe, frame)

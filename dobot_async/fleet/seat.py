@@ -102,7 +102,7 @@ class Seat:
         self._commanding: tuple[Party, ...] = ()
         self._halts = 0
         self._halted: DobotError = MotionStopped("the arm was stopped")
-        self._halting: Any = None  # the frame that stops the arm
+        self._halting: tuple[Any, bytes] | None = None  # the frame that stops the arm, ready to be sent
         self._quiet = False
         self._tasks: set[asyncio.Task[None]] = set()
         self._follower: asyncio.Task[None] | None = None
@@ -119,7 +119,8 @@ class Seat:
         self.arm = arm
         member = self.member
         if self.family.stop and member.options.get("control", True):
-            self._halting = arm.link.frame(self.family.stop, None)
+            frame = arm.link.frame(self.family.stop, None)
+            self._halting = frame, bytes(frame)
 
         if member.guard != "off":
             self._guard = Guard(
@@ -205,7 +206,7 @@ class Seat:
         if self._halting is None:
             return lambda: None
 
-        owed: Callable[[], None] = self.arm.link.shout(self._halting)
+        owed: Callable[[], None] = self.arm.link.shout(*self._halting)
         return owed
 
     def stop(self) -> Coroutine[Any, Any, None]:

@@ -89,6 +89,7 @@ class SerialTransport(asyncio.Protocol):
         self._cause: BaseException | None = None
         self._closing = False
         self._transport: Any = None
+        self._port: int | None = None  # what the system knows it by, if it takes bytes at once
         self._buffer = bytearray()
         self._arrived: asyncio.Future[None] | None = None
         self._take: Callable[[bytes], None] | None = None
@@ -153,6 +154,7 @@ class SerialTransport(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """The port is open; pyserial-asyncio calls this once more, a little after it has returned the transport."""
         self._transport = transport
+        self._port = self._transport.serial.fd if POSIX else None
 
     def data_received(self, data: bytes) -> None:
         """Hands over what arrives, or keeps it; stops reading while nobody takes it."""
@@ -199,11 +201,11 @@ class SerialTransport(asyncio.Protocol):
         pyserial-asyncio would have the loop ask the system first whether the port takes it: that costs more than the
         rest of a request together.
         """
-        if not POSIX or self._transport.get_write_buffer_size():
+        if self._port is None or self._transport.get_write_buffer_size():
             return data
 
         try:
-            return data[os.write(self._transport.serial.fd, data) :]
+            return data[os.write(self._port, data) :]
         except BlockingIOError:
             return data
         except OSError as error:
