@@ -37,6 +37,7 @@ from dobot_async.transports.tasks import Ended, whole, within
 __all__ = ["PACE", "BleTransport", "open_url"]
 
 PACE = 0.02
+TICK = 0.001
 SCAN = 10.0
 CONNECT = 20.0
 GATT = 5.0
@@ -271,9 +272,16 @@ class BleTransport:
         await self._client.write_gatt_char(self._output, chunk, response=self._response)
 
     async def _until(self, due: float) -> None:
-        """Waits for a time, or for the end of the connection."""
-        if (left := due - self._loop.time()) > 0:
+        """Waits for a time, or for the end of the connection.
+
+        An ordinary timer is up to a millisecond late, which may cost the chunk a connection event, so the last one is
+        waited for turn by turn.
+        """
+        if (left := due - TICK - self._loop.time()) > 0:
             await asyncio.wait([self._lost], timeout=left)
+
+        while not self._lost.done() and self._loop.time() < due:  # noqa: ASYNC110 - no event is as exact
+            await asyncio.sleep(0)
 
     async def _call(self, work: Any, seconds: float) -> None:
         """Awaits a call of bleak's, as long as there is a connection, or may be one."""
