@@ -23,7 +23,7 @@ import click
 from dobot_async.cli.commands import ON_OFF
 from dobot_async.cli.families import MODES
 from dobot_async.cli.session import Session
-from dobot_async.errors import DobotError
+from dobot_async.errors import ArmAlarm, DobotError
 from dobot_async.magician.arm import Magician
 from dobot_async.magician.params import IOFunction, PTPMode
 from dobot_async.magician.verbs import Verbs
@@ -250,15 +250,18 @@ async def execute(arm: Magician, steps: Sequence[Step], report: Callable[[int], 
                 done += 1
                 report(done)
     except DobotError as error:
-        step = await ended_at(steps, motions)
+        step = await ended_at(steps, motions, error)
         error.add_note(f"line {step.line} ({step.text})")
         raise
 
 
-async def ended_at(steps: Sequence[Step], motions: Sequence[Motion]) -> Step:
-    """Returns the first step that is known to have failed; if there is none, the one that was to be sent next."""
+async def ended_at(steps: Sequence[Step], motions: Sequence[Motion], error: DobotError) -> Step:
+    """Returns the first step that is known to have failed; if there is none, the one that was to be sent next.
+
+    An alarm ends all Motions, but who waits for room may hear of it before they do.
+    """
     for step, motion in zip(steps, motions, strict=False):
-        if motion.done:
+        if motion.done or isinstance(error, ArmAlarm):
             try:
                 await motion
             except DobotError:
