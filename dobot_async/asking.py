@@ -55,7 +55,7 @@ class Asking(Generic[F]):
         pending: Who waits on it.
         round_trip: How long its answers take.
         stats: Where to count.
-        send: Sends a frame; raises TimeoutError if it cannot within so many seconds.
+        send: Sends a frame, and says when it goes out; raises TimeoutError if that cannot be within so many seconds.
         resync: Gives up a frame the rest of which is overdue, and delivers what was inside of it.
         fences: Questions that harm nobody.
     """
@@ -67,7 +67,7 @@ class Asking(Generic[F]):
         round_trip: RoundTrip,
         stats: LinkStats,
         *,
-        send: Callable[[F, float | None], Awaitable[None]],
+        send: Callable[[F, float | None, Callable[[], None]], Awaitable[None]],
         resync: Callable[[], None],
         fences: Sequence[F],
     ) -> None:
@@ -153,9 +153,7 @@ class Asking(Generic[F]):
         answered: asyncio.Future[Any] = self._loop.create_future()
         with self._pending.expect(frame.key, lambda _: None) as waiter, suppress(TimeoutError):
             waiter.listen(partial(deliver, answered))
-            self._stats.sent += 1
-            waiter.sent()
-            await self._send(frame, None)
+            await self._send(frame, None, waiter.sent)
             if self._link.disorder:  # on a stream nothing overtakes it
                 async with asyncio.timeout(self._round_trip.timeout):
                     await answered
@@ -179,13 +177,15 @@ class Asking(Generic[F]):
 
     async def _ask(self, frame: F, waiter: Waiter[F], reply: asyncio.Future[Any], patience: float) -> bool:
         """Sends a frame, unless its answer is there already; returns whether there is one in time."""
-        if not reply.done():
-            self._stats.sent += 1
+
+        def leaving() -> None:
             self._stats.repeated += bool(waiter.sends)
             waiter.sent()
+
+        if not reply.done():
             expiry = self._loop.call_later(patience, deliver, reply, OVERDUE)
             try:
-                await self._send(frame, patience)
+                await self._send(frame, patience, leaving)
                 await self._prove(waiter, reply, patience)
                 await reply
             except TimeoutError:
@@ -215,9 +215,7 @@ class Asking(Generic[F]):
         waiter.hold()
         with self._pending.expect(frame.key, lambda _: None) as witness:
             witness.listen(waiter.prove)
-            self._stats.sent += 1
-            witness.sent()
-            await self._send(frame, patience)
+            await self._send(frame, patience, witness.sent)
             await reply
 
     def _other(self, key: Hashable) -> F | None:

@@ -59,6 +59,7 @@ class Link(Generic[F]):
         events: What happened unasked: frames that nobody waited for, as `Unexpected`, and what the family adds.
         trace: Called with (outgoing, frame) for each frame, if set.
         stray: Called with each frame that nobody waited for, if set.
+        lost: Called once with what every later call raises, when it is lost and not reopened, if set.
     """
 
     def __init__(
@@ -81,6 +82,7 @@ class Link(Generic[F]):
         self.events: Events[object] = Events()
         self.trace: Callable[[bool, F], None] | None = None
         self.stray: Callable[[F], None] | None = None
+        self.lost: Callable[[ConnectionLost], None] | None = None
         self._reopen = reopen
         self._transport = transport
         self._write = prompt(transport)
@@ -245,11 +247,8 @@ class Link(Generic[F]):
         """Notes that a frame was sent the answer to which is for nobody."""
         waiter = self._pending.expect(frame.key, lambda _: None)
         waiter.listen(lambda _: None)
-        waiter.sent()
         self._loop.call_later(LINGER, self._pending.leave, waiter)
-        self._stats.sent += 1
-        if self.trace:
-            self.trace(True, frame)
+        self._left(frame, waiter.sent)
 
     async def post(
         self,
@@ -279,14 +278,16 @@ class Link(Generic[F]):
         if alone:
             await self._turn(None, QUEUED_RANK, timeout, name)
 
-        leaving()
         waiter = self._pending.expect(frame.key, accept, tombstone=tombstone)
         give_turn = partial(self._turns.give, None) if alone else None
         posted: Posted[R] = Posted(self, name, waiter, self._round_trip, give_turn)
-        try:
+
+        def noted() -> None:
+            leaving()
             waiter.sent()
-            self._stats.sent += 1
-            await self._send(frame, timeout)
+
+        try:
+            await self._send(frame, timeout, noted)
         except BaseException as error:
             posted.forget()
             if isinstance(error, TimeoutError):
@@ -352,6 +353,9 @@ class Link(Generic[F]):
         self.state.change(state)
         self.state.close()
         self._pending.fail(self._lost())
+        if state is LinkState.LOST and self.lost:
+            self.lost(self._lost())
+
         self.events.close()
 
     async def _turn(self, key: Hashable, rank: int, timeout: float, what: str) -> None:
@@ -369,20 +373,24 @@ class Link(Generic[F]):
             self._turns.give(key)
             self._check()
 
-    async def _send(self, frame: F, patience: float | None) -> None:
-        """Hands one whole frame to the transport; raises TimeoutError if it does not take it in so many seconds."""
-        if self.trace:
-            self.trace(True, frame)
+    async def _send(self, frame: F, patience: float | None, leaving: Callable[[], None]) -> None:
+        """Hands one whole frame to the transport; raises TimeoutError if it does not take it in so many seconds.
 
+        `leaving` is called when it goes out, which is in the order in which the arm gets the frames: of one that never
+        had its turn nobody may expect an answer.
+        """
         data = bytes(frame)
         if self._unanswered == MUTE:
             self._unanswered = 0
             data = self._filler + data
 
         if not self._sending.locked() and self._write(data):
+            self._left(frame, leaving)
             return
 
         async with asyncio.timeout(patience), self._sending:
+            self._check()
+            self._left(frame, leaving)
             try:
                 await self._transport.send(data)
             except BROKEN as error:
@@ -391,6 +399,13 @@ class Link(Generic[F]):
 
                 self._end(LinkState.LOST, error.__cause__ or error)
                 raise self._lost() from error
+
+    def _left(self, frame: F, leaving: Callable[[], None]) -> None:
+        """Takes note of a frame that goes out."""
+        leaving()
+        self._stats.sent += 1
+        if self.trace:
+            self.trace(True, frame)
 
     async def _read(self) -> None:
         """Reads until the transport ends, and from the next one if it may be reopened."""

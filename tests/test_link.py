@@ -313,6 +313,29 @@ async def test_a_line_that_does_not_take_the_frame_is_a_timeout_and_frees_the_li
             assert await link.request(TIME, None) >= 0
 
 
+async def test_nothing_is_owed_for_what_never_had_its_turn_to_be_sent() -> None:
+    async with line(buffer=0) as (link, far):
+        first = start(post(link, 1, timeout=1.0))
+        await asyncio.sleep(0)
+        with pytest.raises(ReplyTimeout):
+            await link.request(TIME, None, timeout=0.2)
+
+        left: list[bool] = []
+        with pytest.raises(ReplyTimeout):
+            await link.post(queued(2), index_is(2), name="SetWAITCmd", timeout=0.2, leaving=lambda: left.append(True))
+
+        assert not left
+        assert link.stats.sent == 1
+        assert await far.one() == queued(1)
+        await far.say(acknowledged(1))
+        assert await (await first).answer() == 1
+        second = start(link.request(TIME, None))
+        asked = await far.one()
+        await far.say(numbered(asked, 7))
+        assert await second == 7
+        assert link.stats.sent == 2
+
+
 # Timeouts, repetition, late replies
 
 

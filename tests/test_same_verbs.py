@@ -22,6 +22,7 @@ from dobot_async import (
     ReplyTimeout,
     UltraArm,
 )
+from dobot_async.contract import LinkState
 from dobot_async.magician import commands as magician
 from dobot_async.motion import MotionQueue
 from dobot_async.mycobot import commands as mycobot
@@ -236,6 +237,19 @@ async def test_a_line_that_is_cut_ends_everything(family: Family) -> None:
                 motion = await arm.queue.move_joints(*family.far)
                 sim.unplug()
                 await motion
+
+
+@each_family
+async def test_a_line_that_is_cut_ends_the_motions_that_nobody_awaits(family: Family) -> None:
+    async with simulate(family.model, speed=SLOW) as sim, family.connect(sim.url) as arm:
+        motion = await arm.queue.move_joints(*family.far)
+        changes = aiter(arm.link.state)
+        sim.unplug()
+        assert await anext(changes) is LinkState.LOST
+        assert motion.done
+        assert arm.queue.pending == 0
+        with pytest.raises(ConnectionLost, match="cable"):
+            await motion
 
 
 @each_family

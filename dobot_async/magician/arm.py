@@ -126,6 +126,7 @@ class Magician(Verbs[Awaitable[None]]):
         self._check_reach = check_reach
         self._executor = MagicianExecutor(link, window, self._check)
         self.queue = MagicianQueue(self._executor)
+        link.lost = lambda error: self.queue.fail(error)  # noqa: PLW0108 - a fleet gives the arm another queue
 
     @classmethod
     @asynccontextmanager

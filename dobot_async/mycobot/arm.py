@@ -57,6 +57,7 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
         self._hand = CobotHand(self._channel, tolerance)
         self._executor = HostedExecutor(self._hand)
         self.queue = CobotQueue(self._executor, model)
+        link.lost = lambda error: self.queue.fail(error)  # noqa: PLW0108 - a fleet gives the arm another queue
         super().__init__(self._channel, self._hand)
 
     @property

@@ -80,6 +80,7 @@ class UltraArm(Verbs[Awaitable[None]]):
         self.pump = pump
         self._executor = UltraArmExecutor(link, limits.check, depth=depth, tolerance=tolerance, on_stop=on_stop)
         self.queue = UltraArmQueue(self._executor, pump)
+        link.lost = lambda error: self.queue.fail(error)  # noqa: PLW0108 - a fleet gives the arm another queue
 
     @classmethod
     @asynccontextmanager

@@ -137,10 +137,7 @@ def judge(record: Record, sim: Simulation, plan: Plan) -> None:
         ensure(sim.arm.counters.overflowed == 0, f"{sim.arm.counters.overflowed} commands were put into a full queue")
 
     ensure(record.pending == 0, f"{record.pending} Motions are pending at the end")
-    # On a line that is gone nothing is settled any more; who waits for it has heard, and the rest ends with the block.
-    ensure(
-        record.entering == 0 or plan.disaster == "unplug", f"{record.entering} Motions are not accepted, and not ended"
-    )
+    ensure(record.entering == 0, f"{record.entering} Motions are not accepted, and not ended")
     ensure(record.left_over == 0, f"{record.left_over} wait for replies at the end")
 
 

@@ -23,6 +23,7 @@ HARD = {
     702423: "a command that the network doubles in front of one that may go out at once",
     403548: "two urgent calls of one command, of which the first one's proof is lost",
     83242: "books from before a power failure",
+    2058674: "a command whose put was cancelled, accepted just before the cable was pulled",
 }
 
 
