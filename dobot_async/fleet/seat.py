@@ -138,7 +138,8 @@ class Seat:
             self._zones.guards.append(self._guard.catch_up)
 
         self.queue.overseer = self
-        self._spawn(self._watch(), "watcher")
+        if arm.link.state.value is LinkState.LOST:  # when its queue could not tell yet
+            self.ended(ConnectionLost(f"the connection to {arm.link.url} was lost"))
 
     def end(self) -> set[asyncio.Task[None]]:
         """Leaves the arm to itself; returns the tasks that end because of it."""
@@ -285,20 +286,6 @@ class Seat:
                 await self._guard.catch_up()
             elif step in self._steps:
                 self._steps.remove(step)
-
-    async def _watch(self) -> None:
-        """Tells the fleet when the link is lost."""
-        link = self.arm.link
-        changes = aiter(link.state)
-        state = link.state.value
-        while state is not LinkState.LOST:
-            try:
-                state = await anext(changes)
-            except StopAsyncIteration:
-                return
-
-        error = ConnectionLost(f"{self.name}: the connection to {link.url} was lost")
-        self.ended(error)
 
     def _spawn(self, work: Any, what: str) -> asyncio.Task[None]:
         """Starts a task that ends with the seat."""

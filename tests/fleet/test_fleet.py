@@ -12,6 +12,7 @@ from virtual import virtual
 from dobot_async import ArmAlarm, ConnectFailed, ConnectionLost, Fleet, Magician, MotionStopped, MyCobot, UltraArm
 from dobot_async.fleet import BarrierBroken, Member
 from dobot_async.fleet.fleet import OnFailure
+from dobot_async.fleet.seat import Seat
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate
 
@@ -281,6 +282,24 @@ async def test_a_lost_link_is_noticed_although_nobody_asks() -> None:
     async with cell("left", "right") as sims, Fleet.connect(urls(sims)) as fleet:
         sims["left"].unplug()
         await asyncio.sleep(0.1)
+        assert isinstance(fleet.failures["left"], ConnectionLost)
+        with pytest.raises(MotionStopped, match="left"):
+            await fleet["right"].move_to(*NEAR)
+
+
+@virtual
+async def test_a_link_that_is_lost_before_its_arm_has_its_seat_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    begin = Seat.begin
+
+    async def begin_too_late(seat: Seat, arm: Magician) -> None:
+        if seat.name == "left":
+            sims["left"].unplug()
+            await anext(aiter(arm.link.state))
+
+        await begin(seat, arm)
+
+    monkeypatch.setattr(Seat, "begin", begin_too_late)
+    async with cell("left", "right") as sims, Fleet.connect(urls(sims)) as fleet:
         assert isinstance(fleet.failures["left"], ConnectionLost)
         with pytest.raises(MotionStopped, match="left"):
             await fleet["right"].move_to(*NEAR)
