@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import random
 import socket
 import sys
 import threading
@@ -32,13 +33,20 @@ __all__ = [
 ]
 
 IN_TIME = 20.0
+PORTS = 20_000, 32_000
 
 
 def endpoint(protocol: str = "tcp") -> str:
-    """A free place to listen at."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+    """A free place to listen at.
+
+    It is none of those that systems give to who does not ask for one: nobody gets it while nobody listens there, not
+    even who tries to connect to it, who could meet himself.
+    """
+    while True:
+        port = random.randrange(*PORTS)
+        with suppress(OSError), socket.socket() as probe:
+            probe.bind(("127.0.0.1", port))
+            return f"{protocol}/127.0.0.1:{port}"
 
 
 def place(name: str = "left", **more: str) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 from urllib.parse import SplitResult
 
 import anyio
+from anyio.abc import SocketAttribute
 
 from dobot_async.errors import ConnectFailed
 from dobot_async.transports.base import MANY, Transport, Wrapped, options
@@ -22,6 +23,7 @@ WINDOW = 16
 DISORDER = 0.015  # seconds; one access point keeps datagrams in order, and doubles them within a few milliseconds
 TOKEN_LINE = b"TOKEN %s\n"
 SYSTEM = "system"
+ENDS = SocketAttribute.local_address, SocketAttribute.remote_address
 
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
@@ -61,6 +63,12 @@ async def connect(host: str, port: int, ca: str | None, greeting: bytes) -> Tran
         stream = await anyio.connect_tcp(
             host, port, tls=True, ssl_context=trust(ca), tls_standard_compatible=False, tls_hostname=host
         )
+
+    ends = {stream.extra(end) for end in ENDS}  # noqa: S610 - not Django's
+    if len(ends) == 1:
+        # Where nobody listens on this computer, the system may give the caller the very port that it calls.
+        await anyio.aclose_forcefully(stream)
+        raise ConnectionRefusedError("nobody listens there, and the connection met itself")
 
     if greeting:
         try:

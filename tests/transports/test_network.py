@@ -155,6 +155,19 @@ async def test_tcp_round_trip(host: str) -> None:
         assert await call == POSE
 
 
+async def test_tcp_does_not_take_itself_for_an_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    loop = asyncio.get_running_loop()
+    create_connection: Callable[..., Any] = loop.create_connection
+
+    def from_where_it_leads(*arguments: Any, **options: Any) -> Any:
+        return create_connection(*arguments, **{**options, "local_addr": ("127.0.0.1", port)})
+
+    monkeypatch.setattr(loop, "create_connection", from_where_it_leads)
+    with pytest.raises(ConnectFailed, match="nobody listens there"):
+        await open_transport(f"tcp://127.0.0.1:{port}", arm="magician")
+
+
 async def test_tcp_frames_may_be_cut_anywhere() -> None:
     async with tcp_peer() as peer, linked(peer.url) as link:
         call = asyncio.create_task(link.request(c.GET_POSE, None))
