@@ -9,6 +9,7 @@ that nothing can end fails the test instead of hanging. Such a test does no real
 from __future__ import annotations
 
 import asyncio
+import signal
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import suppress
@@ -27,7 +28,10 @@ OWNED_BY_THE_LOOP = ("asyncio_", "asyncio-waitpid", "AnyIO worker thread")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Registers the mark."""
+    """Registers the mark, and lets programs that tests start hear Ctrl-C, which a shell's background job ignores."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
     config.addinivalue_line("markers", "virtual_time: the clock jumps over every wait; no real I/O")
 
 
