@@ -28,9 +28,11 @@ OWNED_BY_THE_LOOP = ("asyncio_", "asyncio-waitpid", "AnyIO worker thread")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Registers the mark, and lets programs that tests start hear Ctrl-C, which a shell's background job ignores."""
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Registers the mark, and lets programs that tests start hear the signals that a background job ignores."""
+    for name in ("SIGINT", "SIGHUP"):
+        number = getattr(signal, name, None)  # not every system has both
+        if number and signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)  # what is ignored stays so in programs, what is handled does not
 
     config.addinivalue_line("markers", "virtual_time: the clock jumps over every wait; no real I/O")
 
