@@ -64,7 +64,7 @@ async def connect(host: str, port: int, ca: str | None, greeting: bytes) -> Tran
             host, port, tls=True, ssl_context=trust(ca), tls_standard_compatible=False, tls_hostname=host
         )
 
-    ends = {stream.extra(end) for end in ENDS}  # noqa: S610 - not Django's
+    ends = {stream.extra(end, None) for end in ENDS}  # noqa: S610 - not Django's; who hung up at once has no address
     if len(ends) == 1:
         # Where nobody listens on this computer, the system may give the caller the very port that it calls.
         await anyio.aclose_forcefully(stream)

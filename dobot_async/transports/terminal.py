@@ -144,7 +144,7 @@ class PseudoTerminal(Generic[P]):
 def make_raw(terminal: int) -> None:
     """Makes a terminal a line for bytes, with nothing on its way."""
     import termios  # noqa: PLC0415 - Windows has neither, and needs none for the other places
-    import tty  # noqa: PLC0415
+    import tty  # noqa: PLC0415 - as termios
 
     tty.setraw(terminal)
     termios.tcflush(terminal, termios.TCIOFLUSH)

@@ -168,6 +168,25 @@ async def test_tcp_does_not_take_itself_for_an_arm(monkeypatch: pytest.MonkeyPat
         await open_transport(f"tcp://127.0.0.1:{port}", arm="magician")
 
 
+async def test_tcp_to_a_peer_that_hangs_up_at_once_is_opened_and_then_broken(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = asyncio.get_running_loop()
+    create_connection: Callable[..., Any] = loop.create_connection
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        async def and_is_reset(*arguments: Any, **options: Any) -> Any:
+            made = await create_connection(*arguments, **options)
+            peer, _ = server.accept()
+            peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            peer.close()
+            return made
+
+        monkeypatch.setattr(loop, "create_connection", and_is_reset)
+        transport = await open_transport(f"tcp://127.0.0.1:{server.getsockname()[1]}", arm="magician")
+        async with aclosing(transport):
+            with pytest.raises(anyio.BrokenResourceError):
+                await transport.receive()
+
+
 async def test_tcp_frames_may_be_cut_anywhere() -> None:
     async with tcp_peer() as peer, linked(peer.url) as link:
         call = asyncio.create_task(link.request(c.GET_POSE, None))
