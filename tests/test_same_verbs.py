@@ -204,7 +204,7 @@ async def test_observers_send_reads_alone(family: Family) -> None:
 
 @each_family
 async def test_nobody_answers(family: Family) -> None:
-    async with simulate(family.model, faults=Faults(stalled=True)) as sim:
+    async with simulate(family.model, faults=Faults(silent=True)) as sim:
         with pytest.raises(ConnectFailed, match="answers at"):
             async with family.connect(sim.url, timeout=0.3):
                 pass

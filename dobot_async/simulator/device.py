@@ -81,6 +81,12 @@ class Device:
         return self._course.running.work if self._course.running else None
 
     @property
+    def beside(self) -> Work | None:
+        """The work that goes on beside the queue, such as a jog, if any."""
+        self.advance()
+        return self._course.aside.work if self._course.aside else None
+
+    @property
     def following(self) -> Work | None:
         """The work that the queue comes to next, if any; in `begin`, the one behind it."""
         self.advance()

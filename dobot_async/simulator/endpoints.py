@@ -24,7 +24,7 @@ import anyio
 
 from dobot_async.errors import ConnectFailed
 from dobot_async.families import Parts
-from dobot_async.simulator.faults import PROBABILITIES, TIMES, Channel, Faults
+from dobot_async.simulator.faults import MEANS, PROBABILITIES, TIMES, Channel, Faults, LineState
 from dobot_async.transports.base import MANY, Transport, options
 from dobot_async.transports.baud import AtBaud
 from dobot_async.transports.listen import on_tcp, on_udp
@@ -36,7 +36,7 @@ MODELS: Parts[Callable[..., Any]] = Parts("simulator")
 """The simulated arms by name: each is made with a clock, and has a `session()` for each client."""
 BLE_OPTIONS = {"name": str, "address": str, "interval": float, "mtu": int, "packets": int}
 PTY_OPTIONS = {"baud": int}
-FAULT_OPTIONS = dict.fromkeys((*PROBABILITIES, *TIMES), float)
+FAULT_OPTIONS = dict.fromkeys((*PROBABILITIES, *TIMES, *MEANS), float)
 SILENCE = 1.0  # seconds after which a client that cannot be seen to leave counts as another one
 BUFFER = 1 << 16
 LEAST_DISORDER = 0.005
@@ -61,6 +61,7 @@ class Simulation:
         arm: The arm: its pose, executed commands, alarms, inputs and outputs, counters.
         faults: What the line does to messages; may be changed at any time.
         environment: What other programs need in their environment to reach it.
+        outages: When a stall or a silence that was drawn began on a line, and when it ends, in the loop's seconds.
     """
 
     def __init__(self, arm: Any, faults: Faults, seed: int | None) -> None:
@@ -68,8 +69,10 @@ class Simulation:
         self.arm = arm
         self.faults = faults
         self.environment: dict[str, str] = {}
+        self.outages: list[tuple[float, float]] = []
         self._random = Random(seed)  # noqa: S311 - repeatable faults, no secrets
-        self._clients: set[Client] = set()
+        self._clients: dict[Client, None] = {}
+        self._departed: list[Client] = []
         self._ended = False
 
     def client(
@@ -78,27 +81,51 @@ class Simulation:
         hang_up: Callable[[], None],
         *,
         ordered: bool,
-        hold: Callable[[bool], None] | None = None,  # noqa: ARG002 - an arm is never too slow for its line
-        name: str = "",  # noqa: ARG002 - and tells of nobody
+        hold: Callable[[bool], None] = lambda _: None,
+        name: str = "",  # noqa: ARG002 - an arm tells of nobody
     ) -> Client:
         """Called by an endpoint: somebody has connected, and takes replies by `deliver`."""
-        client = Client(self.arm.session, self.faults, self._random, deliver, hang_up, ordered=ordered)
-        self._clients.add(client)
+        client = Client(
+            self.arm.session,
+            self.faults,
+            self._random,
+            deliver,
+            hang_up,
+            ordered=ordered,
+            hold=hold,
+            outages=self.outages,
+        )
+        self._clients[client] = None
         if self._ended:
             self.unplug()  # a connection that was being made when the simulation ended
 
         return client
 
     def leave(self, client: Client) -> None:
-        """Called by an endpoint: a client has gone."""
-        client.close()
-        self._clients.discard(client)
+        """Called by an endpoint: a client has gone. What it has sent before still reaches the arm."""
+        if client in self._clients:
+            del self._clients[client]
+            client.leave()
+            self._departed = [each for each in (*self._departed, client) if each.sending]
 
     def unplug(self) -> None:
-        """Breaks the line of every client, as pulling the cable does."""
-        for client in list(self._clients):
-            self.leave(client)
+        """Breaks the line of every client, as pulling the cable does; what is on the way is lost."""
+        clients, departed = list(self._clients), self._departed
+        self._clients.clear()
+        self._departed = []
+        for client in (*clients, *departed):
+            client.close()
+
+        for client in clients:
             client.hang_up()
+
+    def vanish(self) -> None:
+        """The arm neither reads nor answers any more what its clients of now send; their connections stay open.
+
+        As when its computer loses power or its network: nothing tells the clients. New ones can connect.
+        """
+        for client in self._clients:
+            client.vanish()
 
     def end(self) -> None:
         """Breaks all lines, for good."""
@@ -118,32 +145,57 @@ class Client:
         hang_up: Callable[[], None],
         *,
         ordered: bool,
+        hold: Callable[[bool], None],
+        outages: list[tuple[float, float]],
     ) -> None:
         self.hang_up = hang_up
+        self._hold = hold
         self._new_session = session
         self._session = session()
         self._loop = asyncio.get_running_loop()
-        self._heard = self._loop.time()
-        self._back = Channel(faults, random, deliver, ordered=ordered)
-        self._there = Channel(faults, random, self._answer, ordered=ordered)
+        self._sent = self._loop.time()
+        self._gone = self._deaf = False
+        state = LineState(outages)
+        self._back = Channel(faults, random, deliver, ordered=ordered, state=state, from_arm=True)
+        self._there = Channel(faults, random, self._answer, ordered=ordered, state=state)
+
+    @property
+    def sending(self) -> bool:
+        """Whether something is on the way to the arm."""
+        return self._there.carries
 
     def send(self, data: bytes) -> None:
         """Puts a request on the line."""
+        if self._deaf:
+            return
+
+        now = self._loop.time()
+        if now - self._sent > SILENCE and not self.sending:
+            self._session = self._new_session()
+
+        self._sent = now
         self._there.send(data)
 
+    def leave(self) -> None:
+        """Nobody hears the arm any more; what is on the way to it goes on."""
+        self._gone = True
+        self._back.close()
+
     def close(self) -> None:
-        """Forgets what is on the way."""
+        """Forgets what is on the way, both ways."""
+        self._gone = True
         self._there.close()
         self._back.close()
 
-    def _answer(self, data: bytes) -> None:
-        now = self._loop.time()
-        if now - self._heard > SILENCE:
-            self._session = self._new_session()
+    def vanish(self) -> None:
+        """The arm hears and says nothing any more; what is sent waits in the system's buffers, or is lost."""
+        self._deaf = True
+        self.close()
+        self._hold(True)
 
-        self._heard = now
+    def _answer(self, data: bytes) -> None:
         replies = self._session.receive(data)
-        if replies:
+        if replies and not self._gone:
             self._back.send(replies)
 
 
@@ -258,7 +310,7 @@ class MemoryTransport:
         self._stack = stack
         self.in_flight, self.window = (1, 1) if self.disorder else (MANY, 16)
         self._arriving, self._arrived = anyio.create_memory_object_stream[bytes](BUFFER)
-        self._client = simulation.client(self._deliver, self._arriving.close, ordered=True)
+        self._client = simulation.client(self._deliver, self._arriving.close, ordered=not self.disorder)
 
     @property
     def disorder(self) -> float:

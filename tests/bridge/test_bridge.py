@@ -77,7 +77,7 @@ async def test_it_listens_in_several_places() -> None:
 
 
 async def test_without_an_arm_it_does_not_begin() -> None:
-    async with simulate(listen=TCP, faults=Faults(stalled=True)) as sim:
+    async with simulate(listen=TCP, faults=Faults(silent=True)) as sim:
         with pytest.raises(ConnectFailed, match="no arm answers"):
             async with bridge(sim.url, timeout=0.2):
                 pass
@@ -407,13 +407,13 @@ async def test_the_line_to_the_arm_is_mended_and_no_motion_sent_twice() -> None:
 async def test_what_was_sent_before_an_outage_is_not_sent_after_it() -> None:
     async with bridged(speed=1.0) as rig, client(rig.url) as plain:
         await plain.ask(c.SET_QUEUED_CMD_START_EXEC)
-        rig.sim.faults.stalled = True
+        rig.sim.faults.silent = True
         sent = rig.bridge.link.stats.sent
         await plain.send(far(), ask(c.GET_DEVICE_NAME))
         await until(lambda: rig.bridge.link.stats.sent == sent + 2)
         rig.sim.unplug()
         await until(lambda: rig.bridge.link.outages)
-        rig.sim.faults.stalled = False
+        rig.sim.faults.silent = False
         assert (await plain.receive()).id == c.GET_DEVICE_NAME.id
         await until(lambda: rig.told("refused"))
         assert "SetPTPCmd" in rig.told("refused")[0]
@@ -429,12 +429,12 @@ async def test_who_vanishes_while_the_arm_is_out_of_reach_stops_it_afterwards() 
             for _ in range(2):
                 await plain.receive()
 
-            rig.sim.faults.stalled = True
+            rig.sim.faults.silent = True
             rig.sim.unplug()
 
         await until(lambda: rig.told("link"))
         assert rig.sim.arm.device.moving
-        rig.sim.faults.stalled = False
+        rig.sim.faults.silent = False
         await until(lambda: rig.told("stopped"))
         assert not rig.sim.arm.device.moving
 

@@ -529,7 +529,7 @@ async def test_inputs_outputs_and_sensors() -> None:
 
 @virtual
 async def test_a_silent_arm_fails_the_connection_with_advice() -> None:
-    async with simulate(faults=Faults(stalled=True)) as sim:
+    async with simulate(faults=Faults(silent=True)) as sim:
         with pytest.raises(ConnectFailed, match=r"switched on.*3D-printing"):
             async with Magician.connect(sim.url, timeout=2):
                 pass
@@ -554,7 +554,7 @@ async def test_an_arm_that_falls_silent_ends_what_is_awaited() -> None:
         with pytest.raises(ConnectionLost, match="no longer answers"):
             async with Magician.connect(sim.url) as arm:
                 motion = await arm.queue.move_to(220, 0, 40)
-                sim.faults.stalled = True
+                sim.faults.silent = True
                 await motion
 
 

@@ -537,7 +537,7 @@ async def test_a_host_that_does_not_exist() -> None:
 async def test_connecting_may_be_cancelled(listen: str) -> None:
     """At whatever step it is."""
     async with simulate(listen=listen) as sim:
-        sim.faults.stalled = True
+        sim.faults.silent = True
         for steps in itertools.chain(range(8), [50]):
             connecting = asyncio.create_task(refused(sim.url, ".", timeout=1000))
             for _ in range(steps):
@@ -548,7 +548,7 @@ async def test_connecting_may_be_cancelled(listen: str) -> None:
 
         # A port that is being opened is let go by the thread that opens it.
         await until(lambda: not any("open" in thread.name for thread in threading.enumerate()))
-        sim.faults.stalled = False
+        sim.faults.silent = False
         async with Magician.connect(sim.url) as arm:
             await arm.get_pose()
 

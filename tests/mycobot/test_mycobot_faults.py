@@ -248,7 +248,7 @@ async def test_a_silent_device_never_hangs_a_call() -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
         motion = await arm.queue.move_joint(1, 150)
         await asyncio.sleep(0.2)
-        arm_faults(sim, Faults(stalled=True))
+        arm_faults(sim, Faults(silent=True))
         loop = asyncio.get_running_loop()
         begun = loop.time()
         for name in READINGS:

@@ -37,6 +37,7 @@ PTP = bytes.fromhex("AAAA135403") + struct.pack("<B4f", 1, 220, 0, 40, 0)
 PLACES = ["memory", "pty", "tcp://127.0.0.1:0", "udp://127.0.0.1:0"]
 SHARED = ["memory", "tcp://127.0.0.1:0", "udp://127.0.0.1:0"]
 IN_TIME = 3.0
+ENDLESS = 1e12  # mean seconds, cut at 60
 
 everywhere = pytest.mark.parametrize("listen", PLACES)
 at_odd_times = pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
@@ -559,15 +560,15 @@ async def test_jitter_stays_within_its_bounds() -> None:
 
 
 @virtual
-async def test_a_stalled_line_lets_nothing_through_not_even_what_is_on_the_way() -> None:
+async def test_a_silent_line_loses_everything_even_what_is_on_the_way() -> None:
     async with simulate(faults=Faults(latency=0.25)) as sim, client(sim.url) as transport:
         await transport.send(GET_NAME)
         await asyncio.sleep(0.375)  # the request has arrived, the reply has not
-        sim.faults.stalled = True
+        sim.faults.silent = True
         await transport.send(GET_NAME)
         assert await heard_in(transport, 3600) == []
         assert sim.arm.counters.requests == 1
-        sim.faults.stalled = False
+        sim.faults.silent = False
         assert await heard_in(transport, 3600) == []
         assert await ask(transport) == NAME_REPLY
 
@@ -584,13 +585,249 @@ async def test_faults_may_change_at_any_time() -> None:
 
 
 @virtual
-async def test_a_closed_client_hears_no_more_and_the_arm_hears_no_more_of_it() -> None:
+async def test_what_was_sent_before_a_client_closed_still_reaches_the_arm() -> None:
+    async with simulate(faults=Faults(stall=1.0, stall_time=ENDLESS)) as sim:
+        async with client(sim.url) as transport:
+            await transport.send(GET_NAME)
+            await transport.send(GET_POSE)
+
+        await asyncio.sleep(59.9)
+        assert sim.arm.counters.requests == 0
+        async with client(sim.url) as another:
+            assert await heard_in(another, 0.2) == []  # the answers are for nobody
+            assert sim.arm.counters.requests == 2
+
+
+@virtual
+async def test_what_was_sent_before_a_client_closed_is_lost_when_the_cable_is_pulled() -> None:
     async with simulate(faults=Faults(latency=1.0)) as sim:
         async with client(sim.url) as transport:
             await transport.send(GET_NAME)
 
+        sim.unplug()
         await asyncio.sleep(10)
         assert sim.arm.counters.requests == 0
+
+
+# Stalls, silences, late messages, and arms that vanish.
+
+
+@virtual
+async def test_a_stall_of_a_minute_loses_nothing_and_keeps_the_order() -> None:
+    async with simulate(faults=Faults(stall=1.0, stall_time=ENDLESS)) as sim, client(sim.url) as transport:
+        await transport.send(GET_NAME)
+        sim.faults.stall = 0.0
+        for _ in range(100):
+            await asyncio.sleep(0.5)
+            await transport.send(GET_POSE)
+            await transport.send(GET_NAME)
+
+        assert sim.arm.counters.requests == 0
+        heard = await heard_in(transport, 20)
+        assert {time for time, _ in heard} == {10.0}
+        assert b"".join(data for _, data in heard)[: len(NAME_REPLY)] == NAME_REPLY
+        assert [len(data) for _, data in heard] == [len(NAME_REPLY)] + [POSE_REPLY, len(NAME_REPLY)] * 100
+        assert sim.outages == [(0.0, 60.0)]
+        assert await ask(transport) == NAME_REPLY
+
+
+@virtual
+async def test_the_way_back_stalls_too() -> None:
+    async with simulate() as sim, client(sim.url) as transport:
+        await transport.send(GET_NAME)
+        assert await transport.receive() == NAME_REPLY
+        answer = sim.arm.answer
+
+        def stalling(frame: Any) -> bytes:
+            sim.faults.stall, sim.faults.stall_time = 1.0, ENDLESS
+            reply: bytes = answer(frame)
+            return reply
+
+        vars(sim.arm)["answer"] = stalling
+        await transport.send(GET_NAME)
+        vars(sim.arm)["answer"] = answer
+        sim.faults.stall = 0.0
+        await transport.send(GET_POSE)
+        assert sim.arm.counters.requests == 3
+        assert [(time, len(data)) for time, data in await heard_in(transport, 70)] == [
+            (60.0, len(NAME_REPLY)),
+            (60.0, POSE_REPLY),
+        ]
+
+
+@virtual
+async def test_a_stall_loses_datagrams() -> None:
+    bad = Faults(stall=1.0, stall_time=ENDLESS, reorder=0.001)
+    async with simulate(faults=bad) as sim, client(sim.url) as transport:
+        await transport.send(GET_NAME)
+        bad.stall = 0.0
+        await asyncio.sleep(59)
+        await transport.send(GET_NAME)
+        await asyncio.sleep(2)
+        assert sim.arm.counters.requests == 0
+        assert await ask(transport) == NAME_REPLY
+
+
+@virtual
+async def test_a_silence_loses_what_is_sent_meanwhile_in_both_directions() -> None:
+    async with simulate() as sim, client(sim.url) as transport:
+        answer = sim.arm.answer
+
+        def silenced(frame: Any) -> bytes:
+            sim.faults.silence, sim.faults.silence_time = 1.0, ENDLESS
+            reply: bytes = answer(frame)
+            return reply
+
+        vars(sim.arm)["answer"] = silenced
+        await transport.send(GET_NAME)  # the answer finds the line dead
+        vars(sim.arm)["answer"] = answer
+        sim.faults.silence = 0.0
+        assert sim.arm.counters.requests == 1
+        assert sim.outages == [(0.0, 60.0)]
+        for _ in range(59):
+            await asyncio.sleep(1)
+            await transport.send(GET_NAME)
+
+        assert sim.arm.counters.requests == 1
+        assert await heard_in(transport, 10) == []
+        assert await ask(transport) == NAME_REPLY
+
+
+@virtual
+async def test_each_client_has_silences_of_its_own() -> None:
+    async with simulate(faults=Faults(silence=1.0)) as sim, client(sim.url) as one, client(sim.url) as other:
+        await one.send(GET_NAME)
+        sim.faults.silence = 0.0
+        assert await ask(other) == NAME_REPLY
+        assert await heard_in(one, 100) == []
+
+
+@at_odd_times
+@virtual
+async def test_a_late_message_is_overtaken_by_those_behind_it() -> None:
+    async with simulate(faults=Faults(late=1.0, late_time=ENDLESS)) as sim, client(sim.url) as transport:
+        await transport.send(GET_NAME)
+        await asyncio.sleep(0.5)
+        sim.faults.late = 0.0
+        assert sim.arm.counters.requests == 1  # only what the arm says is late
+        for _ in range(3):
+            await transport.send(GET_POSE)
+
+        assert [(time, len(data)) for time, data in await heard_in(transport, 100)] == [
+            (0.0, POSE_REPLY),
+            (0.0, POSE_REPLY),
+            (0.0, POSE_REPLY),
+            (59.5, len(NAME_REPLY)),
+        ]
+
+
+@virtual
+async def test_the_switch_holds_back_what_comes_both_ways_and_then_lets_it_go() -> None:
+    async with simulate(faults=Faults(latency=0.25)) as sim, client(sim.url) as transport:
+        await transport.send(GET_NAME)
+        await asyncio.sleep(0.375)  # the request has arrived, the answer has not
+        sim.faults.stalled = True
+        for _ in range(3):
+            await transport.send(GET_POSE)
+
+        assert await heard_in(transport, 3600) == []
+        assert sim.arm.counters.requests == 1
+        sim.faults.stalled = False
+        assert sim.arm.counters.requests == 4
+        await transport.send(GET_NAME)
+        assert [(time, len(data)) for time, data in await heard_in(transport, 3600)] == [
+            (0.0, len(NAME_REPLY)),
+            (0.25, POSE_REPLY),
+            (0.25, POSE_REPLY),
+            (0.25, POSE_REPLY),
+            (0.5, len(NAME_REPLY)),
+        ]
+
+
+@virtual
+async def test_the_switch_may_be_used_again_and_again() -> None:
+    async with simulate() as sim, client(sim.url) as transport:
+        for number in range(1, 10):
+            sim.faults.stalled = True
+            await transport.send(GET_NAME)
+            await asyncio.sleep(10)
+            assert sim.arm.counters.requests == number - 1
+            sim.faults.stalled = False
+            assert await transport.receive() == NAME_REPLY
+
+
+@virtual
+async def test_the_switch_loses_datagrams() -> None:
+    async with simulate(faults=Faults(dup=1.0)) as sim, client(sim.url) as transport:
+        sim.faults.stalled = True
+        await transport.send(GET_NAME)
+        sim.faults.stalled = False
+        assert await heard_in(transport, 10) == []
+        assert sim.arm.counters.requests == 0
+
+
+@virtual
+async def test_silence_has_the_last_word_on_what_a_stall_has_held_back() -> None:
+    faults = Faults(stalled=True)
+    async with simulate(faults=faults) as sim, client(sim.url) as transport:
+        await transport.send(GET_NAME)
+        faults.silent = True
+        await transport.send(GET_NAME)
+        faults.silent = faults.stalled = False
+        assert [data for _, data in await heard_in(transport, 10)] == [NAME_REPLY]
+
+
+@pytest.mark.parametrize("listen", ["memory", "pty", "pty:?baud=115200", "tcp://127.0.0.1:0"])
+async def test_every_stream_can_be_held_back(listen: str) -> None:
+    async with simulate(listen=listen) as sim, client(sim.url) as transport:
+        await transport.send(GET_NAME)
+        assert await receive(transport, len(NAME_REPLY)) == NAME_REPLY
+        sim.faults.stalled = True
+        for _ in range(5):
+            await transport.send(GET_NAME)
+            await asyncio.sleep(0.01)
+
+        assert sim.arm.counters.requests == 1
+        sim.faults.stalled = False
+        assert await receive(transport, 5 * len(NAME_REPLY)) == 5 * NAME_REPLY
+
+
+@pytest.mark.parametrize("listen", ["memory", "pty", "tcp://127.0.0.1:0"])
+async def test_what_was_sent_before_closing_arrives_on_every_stream(listen: str) -> None:
+    async with simulate(listen=listen) as sim:
+        sim.faults.stalled = True
+        async with client(sim.url) as transport:
+            await transport.send(GET_NAME + GET_POSE)
+            await asyncio.sleep(0.05)
+
+        await asyncio.sleep(0.05)
+        assert sim.arm.counters.requests == 0
+        sim.faults.stalled = False
+        assert sim.arm.counters.requests == 2
+
+
+@everywhere
+async def test_an_arm_that_vanishes_leaves_the_connection_open(listen: str) -> None:
+    async with simulate(listen=listen) as sim, client(sim.url) as transport:
+        await transport.send(GET_NAME)
+        assert await receive(transport, len(NAME_REPLY)) == NAME_REPLY
+        sim.vanish()
+        await transport.send(GET_NAME)
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(0.05):
+                await transport.receive()
+
+        await transport.send(GET_NAME)
+        assert sim.arm.counters.requests == 1
+        if listen != "pty":  # whose port has one client for ever
+            async with client(sim.url) as another:
+                await another.send(GET_NAME)
+                assert await receive(another, len(NAME_REPLY)) == NAME_REPLY
+
+        sim.unplug()
+        if not listen.startswith("udp"):
+            with pytest.raises((anyio.EndOfStream, anyio.BrokenResourceError)):
+                await transport.receive()
 
 
 messages = st.lists(st.binary(min_size=1, max_size=12), max_size=20)
@@ -653,7 +890,7 @@ def test_each_fault_does_what_it_says(data: bytes, seed: int) -> None:
         return [piece for _, piece in Faults(**faults).apply(data, Random(seed))]
 
     assert arrives() == [data]
-    assert arrives(loss=1.0) == arrives(stalled=True) == []
+    assert arrives(loss=1.0) == arrives(silent=True) == []
     assert arrives(dup=1.0) == [data, data]
     [corrupted] = arrives(corrupt=1.0)
     assert len(corrupted) == len(data)
@@ -695,6 +932,9 @@ def test_the_options_of_sim_reach_the_line() -> None:
     assert answers("sim:?corrupt=1&seed=1") == []
     assert [len(data) for _, data in answers("sim:?noise=1&seed=1")] != [len(NAME_REPLY)]
     assert len(answers("sim:?split=1")) == 2
+    assert answers("sim:?silence=1", seconds=120) == []
+    assert answers("sim:?stall=1&stall_time=1e12", seconds=200) == [(120.0, NAME_REPLY)]
+    assert answers("sim:?late=1&late_time=1e12", seconds=120) == [(60.0, NAME_REPLY)]
     [(time, _)] = answers("sim:?jitter=0.5&seed=1")
     assert 0.0 < time < 1.0
 
@@ -740,6 +980,13 @@ async def test_each_sim_is_an_arm_of_its_own() -> None:
         ("sim:?latency=-1", "latency"),
         ("sim:?latency=nan", "latency"),
         ("sim:?jitter=inf", "jitter"),
+        ("sim:?stall=2", "stall"),
+        ("sim:?late=-1", "late"),
+        ("sim:?silence=nan", "silence"),
+        ("sim:?stall_time=0", "stall_time"),
+        ("sim:?late_time=inf", "late_time"),
+        ("sim:?silence_time=-1", "silence_time"),
+        ("sim:?silent=1", "'silent'"),
         ("sim:?sped=10", "'sped'"),
         ("sim:?stalled=1", "'stalled'"),
         ("sim:speed=10", "speed=10"),
@@ -811,7 +1058,7 @@ async def test_a_speed_that_is_none_is_named(speed: float) -> None:
         await simulate(speed=speed).__aenter__()
 
 
-@pytest.mark.parametrize("name", ["loss", "corrupt", "dup", "split", "noise"])
+@pytest.mark.parametrize("name", ["loss", "corrupt", "dup", "split", "noise", "stall", "late", "silence"])
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan")])
 def test_a_probability_that_is_none_is_named(name: str, value: float) -> None:
     faults: dict[str, Any] = {name: value}
@@ -819,7 +1066,7 @@ def test_a_probability_that_is_none_is_named(name: str, value: float) -> None:
         Faults(**faults)
 
 
-@pytest.mark.parametrize("name", ["latency", "jitter"])
+@pytest.mark.parametrize("name", ["latency", "jitter", "stall_time", "late_time", "silence_time"])
 @pytest.mark.parametrize("value", [-0.1, float("inf"), float("nan")])
 def test_seconds_that_are_none_are_named(name: str, value: float) -> None:
     faults: dict[str, Any] = {name: value}

@@ -582,7 +582,7 @@ async def test_a_silent_arm_never_hangs_a_call() -> None:
         async with UltraArm.connect(sim.url, on_error="leave") as arm:
             loop = asyncio.get_running_loop()
             motion = await arm.queue.move_to(200, 0, 40)
-            faults.stalled = True
+            faults.silent = True
             for call in (arm.get_angles(), arm.get_version(), arm.request(c.PUMP_ON, None)):
                 before = loop.time()
                 with pytest.raises(ReplyTimeout):
