@@ -1,33 +1,43 @@
-"""What must be true of a run: what each call was told, against what the arm has recorded."""
+"""What must be true of a run: what each call was told, against what the arm has recorded.
+
+The bounds are those of the promise, and none is a constant of the driver:
+
+    a cancelled call      ends within 2 s, as cancelled calls end (`calls`)
+    a stop                was heard 1 s after the line carries everything again, whatever became of the call
+    "unknown"             is an excuse after a silence of 3 s or a disaster
+    a line that is gone   is not one that is silent
+"""
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+from calls import Call, Violation
+from observed import Observed
+
 from dobot_async import ArmAlarm, ConnectionLost, DobotError, MotionStopped, MotionUnknown, ReplyTimeout
 from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame, Parser
-from dobot_async.motion import POLL, Motion
+from dobot_async.motion import Motion
 from dobot_async.simulator import Simulation
 from dobot_async.simulator.work import Executed
 
 if TYPE_CHECKING:
     from scenario import Plan
 
-__all__ = ["Fate", "Kind", "Record", "Violation", "judge"]
+__all__ = ["Fate", "Kind", "Record", "Standstill", "judge", "judge_answer", "judge_set"]
 
 Kind = Literal["move", "step", "far", "wait", "pwm"]
 Found = list[tuple[int, Executed]]
 TINY = 1e-6
-SILENT = 4.0  # seconds: an arm that could not be heard for so long may be given up
-
-
-class Violation(AssertionError):
-    """Something was not as it must be."""
+UNHEARD = 3.0  # seconds of silence after which nobody can know what became of a motion
+SHORT = 0.7  # seconds of silence within which a question may fail that waits for its answer a little longer
+LINGERING = 10.0  # seconds after a silence in which its consequences may come to light
+BRIEF = 1.0  # seconds: a question with a shorter timeout may fail on any line
+HEARD, HEARD_DESPITE_LOSS = 1.0, 5.0  # seconds of a good line, of one that loses, after which a stop has been heard
+NOTICED = 1.0  # seconds after which it is known on a good line that a motion is done
 
 
 @dataclass
@@ -55,90 +65,102 @@ class Fate:
 
 
 @dataclass
+class Standstill:
+    """Commands that a stop ends.
+
+    Attributes:
+        why: What stopped them.
+        numbers: The first and the last of them.
+        begun: When the stop was asked for.
+        ended: When it was said to have happened; None if it was not.
+        certain: Whether it must be heard even if nobody waits for it any more.
+    """
+
+    why: str
+    numbers: tuple[int, int]
+    begun: float
+    ended: float | None
+    certain: bool = True
+
+
+@dataclass
+class Jogging:
+    """The block of a jog: from when it was entered to when it was to be left, and had been."""
+
+    call: Call
+    begun: float
+    over: float | None = None
+
+
+@dataclass
 class Record:
     """What was noted of a run.
 
     Attributes:
         stops: From when to when something was stopped.
-        standstills: When a stop began and ended, and the number of the last command that was put before it began.
-        failures: How calls other than puts failed, and Motions.
-        struck_at: When the power failed or the line broke.
-        silence: The longest time for which requests were sent and nothing was heard.
+        failed: What else failed than a put.
+        struck_at: When the power failed or the line broke, or the connection's block was left.
     """
 
     speed: float
     clock: Callable[[], float]
     trace: Callable[[str], None] | None = None
     fates: list[Fate] = field(default_factory=list)
+    begun: int = -1
     stops: list[tuple[float, float]] = field(default_factory=list)
-    standstills: list[tuple[float, float, int]] = field(default_factory=list)
-    failures: list[DobotError] = field(default_factory=list)
-    struck_at: float | None = None
-    silence: float = 0.0
-    left_over: int = 0
+    standstills: list[Standstill] = field(default_factory=list)
+    joggings: list[Jogging] = field(default_factory=list)
+    failed: list[Call] = field(default_factory=list)
+    struck_at: float = math.inf
+    left_at: float = math.inf
     pending: int = 0
-    entering: int = 0
-    poses: deque[tuple[float, c.Pose]] = field(default_factory=deque)
-    waiting_since: float | None = None
-
-    def failed(self, error: DobotError) -> None:
-        """A call failed."""
-        self.failures.append(error)
-        self.note(f"failed: {error!r}")
 
     def note(self, text: str) -> None:
         """Adds a line to the trace."""
         if self.trace:
             self.trace(f"{self.clock():10.4f} ... {text}")
 
-    def heard(self, now: float, *, outgoing: bool) -> None:
-        """A frame came or went."""
-        if outgoing:
-            self.waiting_since = now if self.waiting_since is None else self.waiting_since
-        elif self.waiting_since is not None:
-            self.silence = max(self.silence, now - self.waiting_since)
-            self.waiting_since = None
 
-        if self.waiting_since is not None:
-            self.silence = max(self.silence, now - self.waiting_since)
-
-    def answered(self, now: float, request: Frame, reply: bytes) -> None:
-        """The arm answered a request."""
-        if request.id == c.GET_POSE.id and not request.write and reply:
-            (frame,) = Parser().feed(reply)
-            self.poses.append((now, c.GET_POSE.reply.decode(frame.params)))
-
-    def check_pose(self, pose: c.Pose, start: float, end: float) -> None:
-        """Raises if the arm was not asked for this pose in this time."""
-        if not any(start - TINY <= time <= end + TINY and each == pose for time, each in self.poses):
-            raise Violation(f"a pose that was read between {start:.4f} and {end:.4f} was not the arm's then: {pose}")
-
-
-def judge(record: Record, sim: Simulation, plan: Plan) -> None:
+def judge(record: Record, seen: Observed, sim: Simulation, plan: Plan) -> None:
     """Raises Violation if anything is not as it must be."""
     numbers = {fate.value: fate.number for fate in record.fates}
     found = [
         (numbers[each.value], each) for each in sim.arm.executed if each.index is not None and each.value in numbers
     ]
     check_order(record, found, plan)
-    errors = [fate.error for fate in record.fates if fate.error] + record.failures
-    check_errors(record, errors, found, plan)
+    for call in record.failed:
+        check_failure(call.error, call.begun or 0.0, call.ended or 0.0, str(call), record, seen, plan, call.timeout)
+
     for fate in record.fates:
-        check_fate(record, fate, [each for number, each in found if number == fate.number], plan)
+        check_fate(record, fate, [each for number, each in found if number == fate.number], seen, plan)
 
-    for start, end, last in record.standstills:
-        late = [
-            (number, each) for number, each in found if number <= last and each.finished / record.speed > end + TINY
-        ]
-        ensure(not late, f"what was stopped from {start:.4f} to {end:.4f} ran later: {late}")
-
+    check_standstills(record, seen, found, plan)
+    check_jogs(record, seen, sim, plan)
     if plan.severity == "none" and not plan.disaster and not any(fate.cancelled for fate in record.fates):
         # A probe that finds out what became of a command takes a place that nobody has counted.
         ensure(sim.arm.counters.overflowed == 0, f"{sim.arm.counters.overflowed} commands were put into a full queue")
 
     ensure(record.pending == 0, f"{record.pending} Motions are pending at the end")
-    ensure(record.entering == 0, f"{record.entering} Motions are not accepted, and not ended")
-    ensure(record.left_over == 0, f"{record.left_over} wait for replies at the end")
+
+
+def judge_answer(call: Call, row: Any, value: Any, seen: Observed, plan: Plan) -> None:
+    """Raises Violation unless a read got what the arm has said, after it was asked, and in the time that it had."""
+    begun, ended = call.begun or 0.0, call.ended or 0.0
+    if call.good and not seen.answered(row, value, call.value, begun - 2 * plan.disorder - TINY, ended + TINY):
+        made = [f"{time:.4f}" for time, each in seen.answers[row.id, value] if each == call.value]
+        raise Violation(f"an answer from before its question (made at {', '.join(made) or 'no time'}): {call}")
+
+    if call.timeout is not None and call.hurried is None and ended - begun > call.timeout + 0.1:
+        raise Violation(f"took {ended - begun:.2f} s, with a timeout of {call.timeout} s: {call}")
+
+
+def judge_set(call: Call, row: Any, value: Any, seen: Observed) -> None:
+    """Raises Violation unless what was set has been set in the time of the call."""
+    begun, ended = call.begun or 0.0, call.ended or 0.0
+    if call.good and not any(
+        begun <= time <= ended + TINY and each is row and what == value for time, each, what in seen.performed
+    ):
+        raise Violation(f"it was said to be set, and was not: {call}")
 
 
 def check_order(record: Record, found: Found, plan: Plan) -> None:
@@ -149,7 +171,7 @@ def check_order(record: Record, found: Found, plan: Plan) -> None:
     twice = [number for place, number in enumerate(order) if place and order[place - 1] == number]
     if plan.disaster == "power":
         # An arm that counts on from the same index after a power failure is not recognised as another one.
-        twice = [number for number in twice if (record.fates[number].ended or 0) < (record.struck_at or 0)]
+        twice = [number for number in twice if (record.fates[number].ended or 0) < record.struck_at]
 
     ensure(not twice or plan.doubles, f"ran twice on a line that doubles nothing: {twice}")
     for number in twice:
@@ -158,24 +180,41 @@ def check_order(record: Record, found: Found, plan: Plan) -> None:
         ensure(fate.kind != "step" or told, f"a relative command ran twice, and was said to be done: {fate}")
 
 
-def check_errors(record: Record, errors: Sequence[DobotError], found: Found, plan: Plan) -> None:
+def check_failure(
+    error: BaseException | None,
+    begun: float,
+    ended: float,
+    what: str,
+    record: Record,
+    seen: Observed,
+    plan: Plan,
+    timeout: float | None = None,
+) -> None:
     """Nothing fails that had no reason to."""
-    order = [number for number, _ in found]
-    surplus = plan.doubles and "step" in plan.kinds
-    if record.struck_at is not None or record.silence > SILENT:
+    if ended >= min(record.struck_at, record.left_at) - TINY:
         return
 
-    for error in errors:
-        unexpected = isinstance(error, (ConnectionLost, ReplyTimeout)) or (
-            isinstance(error, MotionUnknown) and not surplus
-        )
-        ensure(not unexpected, f"failed without a reason: {error!r} (longest silence {record.silence:.2f} s; {order})")
+    if isinstance(error, ConnectionLost):
+        raise Violation(f"a connection that is open was said to be lost: {error!r}: {what}")
+
+    if isinstance(error, MotionUnknown):
+        excused = seen.silent(begun - LINGERING, ended, UNHEARD) or (plan.doubles and "step" in plan.kinds)
+        ensure(excused, f"unknown without a silence: {error!r}: {what}")
+    elif isinstance(error, ReplyTimeout):
+        lost = plan.loses and ended - begun >= BRIEF
+        own = timeout is not None and timeout < BRIEF and ended - begun >= timeout - 2 * TINY
+        excused = own or lost or seen.silent(begun - SHORT, ended, SHORT)
+        ensure(excused, f"no answer on a line that carries them: {error!r}: {what}")
+    elif isinstance(error, ArmAlarm):
+        ensure("far" in plan.kinds, f"no alarm was there: {error!r}: {what}")
+    elif not isinstance(error, MotionStopped):
+        raise Violation(f"failed with what is none of its failures: {error!r}: {what}")
 
 
-def check_fate(record: Record, fate: Fate, found: Sequence[Executed], plan: Plan) -> None:
+def check_fate(record: Record, fate: Fate, found: Sequence[Executed], seen: Observed, plan: Plan) -> None:
     """One command was told the truth."""
     done = [each for each in found if each.outcome == "done"]
-    if plan.disaster == "power" and fate.asked <= (record.struck_at or 0) <= (fate.ended or math.inf):
+    if plan.disaster == "power" and fate.asked <= record.struck_at <= (fate.ended or math.inf):
         # An arm that counts on from the same index after a power failure is not recognised as another one.
         return
 
@@ -188,26 +227,86 @@ def check_fate(record: Record, fate: Fate, found: Sequence[Executed], plan: Plan
         ensure(
             done[0].finished / record.speed <= fate.ended + TINY, f"it was said to be done too early: {fate}, {done}"
         )
-        if fate.motion and not plan.doubles and record.struck_at is None:
+        if fate.motion and not plan.doubles and plan.disaster != "power":
             ensure(fate.motion.index == done[0].index, f"it has another index: {fate.motion.index}, {done}")
 
         return
 
-    if record.struck_at is not None and fate.ended >= record.struck_at:
+    check_failure(fate.error, fate.asked, fate.ended, str(fate), record, seen, plan)
+    if fate.ended >= min(record.struck_at, record.left_at) - TINY:
         return
 
-    if isinstance(fate.error, ArmAlarm):
-        ensure("far" in plan.kinds, f"no alarm was there: {fate}")
-
     if isinstance(fate.error, MotionStopped) and not fate.cancelled:
-        stopped = any(fate.asked <= end + TINY and start <= (fate.ended or 0) + TINY for start, end in record.stops)
+        stopped = any(fate.asked <= end + TINY and start <= fate.ended + TINY for start, end in record.stops)
         ensure(stopped, f"nobody stopped it: {fate} {record.stops}")
 
-    if plan.severity == "none" and done and fate.watched:
-        slack = POLL + 30 * (plan.faults.latency + 2 * plan.disorder) + TINY
+    if plan.severity == "none" and not plan.late and done and fate.watched:
         ensure(
-            done[0].finished / record.speed >= fate.ended - slack, f"it was done, and not said to be: {fate}, {done}"
+            done[0].finished / record.speed >= fate.ended - NOTICED, f"it was done, and not said to be: {fate}, {done}"
         )
+
+
+def check_standstills(record: Record, seen: Observed, found: Found, plan: Plan) -> None:
+    """What was stopped stands as soon as the arm can have heard of it, and for good."""
+    unknown = [
+        Standstill(f"{fate.error!r}", (fate.number, fate.number), fate.ended, None)
+        for fate in record.fates
+        if isinstance(fate.error, MotionUnknown) and fate.ended is not None
+    ]
+    for each in (*record.standstills, *unknown):
+        limit = seen.good_from(each.begun, heard_within(plan))
+        if plan.disaster == "unplug" and limit >= record.struck_at:
+            continue
+
+        if limit >= record.left_at and not each.why.startswith("left"):
+            continue
+
+        if not each.certain:
+            limit = math.inf
+
+        if each.ended is not None:
+            limit = min(limit, each.ended)
+
+        first, last = each.numbers
+        late = [
+            (number, run.finished / record.speed)
+            for number, run in found
+            if first <= number <= last and run.finished / record.speed > limit + TINY
+        ]
+        ensure(not late, f"stopped by {each.why} at {each.begun:.4f}, and ran after {limit:.4f}: {late}")
+
+
+def check_jogs(record: Record, seen: Observed, sim: Simulation, plan: Plan) -> None:
+    """A jog ends with its block, as soon as the arm can have heard of it."""
+    going_on = sim.arm.device.beside
+    jogs = [
+        (each.started / record.speed, each.finished / record.speed)
+        for each in sim.arm.executed
+        if each.command is c.SET_JOG_CMD
+    ]
+    if going_on and going_on.command is c.SET_JOG_CMD:
+        jogs.append((sim.arm.device.now / record.speed, math.inf))
+
+    for started, finished in jogs:
+        ours = [each for each in record.joggings if each.begun <= started + TINY]
+        ensure(bool(ours), f"a jog that nobody asked for at {started:.4f}")
+        over = ours[-1].over
+        if over is None:
+            continue
+
+        limit = seen.good_from(over, heard_within(plan))
+        if plan.disaster == "unplug" and limit >= record.struck_at:
+            continue
+
+        if ours[-1].call.good and ours[-1].call.ended is not None:
+            limit = min(limit, ours[-1].call.ended)
+
+        ensure(finished <= limit + TINY, f"a jog went on until {finished:.4f}, not {limit:.4f}: {ours[-1].call}")
+
+
+def heard_within(plan: Plan) -> float:
+    """Seconds after which a stop has been heard on a line that is as it mostly is."""
+    return HEARD_DESPITE_LOSS if plan.loses else HEARD
 
 
 def ensure(holds: bool, message: str) -> None:
