@@ -27,7 +27,7 @@ from dobot_async.simulator.work import Executed
 if TYPE_CHECKING:
     from scenario import Plan
 
-__all__ = ["Fate", "Kind", "Record", "Standstill", "judge", "judge_answer", "judge_set"]
+__all__ = ["Fate", "Jogging", "Kind", "Record", "Standstill", "check_jogs", "judge", "judge_answer", "judge_set"]
 
 Kind = Literal["move", "step", "far", "wait", "pwm"]
 Found = list[tuple[int, Executed]]

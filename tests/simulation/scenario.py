@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 import async_solipsism
 from calls import MOMENTS, Call, How, Mine, Violation, draw_how, made
-from judgement import Fate, Jogging, Kind, Record, Standstill, judge, judge_answer, judge_set
+from judgement import Fate, Jogging, Kind, Record, Standstill, check_jogs, judge, judge_answer, judge_set
 from observed import Observed
 
 from dobot_async import DobotError, Jog, Magician, PTPMode
@@ -33,6 +33,7 @@ SPEED = 20.0
 LONG = 120.0  # virtual seconds within which everything completes once the line is good again
 PATIENT = 60.0  # virtual seconds that a read may take on a bad line
 LEAVING = 4.0  # virtual seconds that leaving the connection's block by an error may take, the closing included
+ENDLESS = 3000.0  # virtual seconds in which a program ends that waits for nothing but calls and moments
 WALL = 30  # seconds after which a run counts as endless
 DATAGRAM_DISORDER = 0.005  # seconds within which a line that doubles messages doubles them
 
@@ -73,6 +74,7 @@ class Plan:
         datagrams: Whether the line doubles and reorders messages; a stream splits, merges and stalls.
         late: Probability that an answer comes alone, on a line that loses nothing.
         kinds: What is put.
+        reads: What is read, little enough that the same is read again soon.
         disaster: What happens once, if anything; "leave" ends the connection's block by an error.
     """
 
@@ -83,6 +85,7 @@ class Plan:
     options: DeviceOptions
     window: int
     kinds: Sequence[Kind]
+    reads: Sequence[tuple[Any, Sequence[Any]]]
     disaster: Literal["", "power", "unplug", "leave"]
     steps: int
     doubles: bool
@@ -114,6 +117,7 @@ class Plan:
             DeviceOptions(capacity=random.choice([1, 2, 8, 32]), on_fault=random.choice(["halt", "continue"])),
             random.choice([1, 4]) if severity == "none" and not datagrams else 1,
             kinds,
+            random.sample(READS, 3),
             random.choice(["power", "unplug", "leave", "leave"]) if random.random() < 0.2 else "",
             random.randint(5, 40),
             faults.dup > 0,
@@ -129,9 +133,9 @@ def line(random: Random, severity: str, *, datagrams: bool) -> Faults:
         return faults
 
     rare = {"standing": 1.0, "harsh": 0.5, "mild": 0.2}[severity]
-    faults.stall = random.choice([0, 0.002, 0.01]) * rare
+    faults.stall = random.choice([0, 0.005, 0.02]) * rare
     faults.stall_time = random.choice([0.2, 1.0, 4.0, 10.0])
-    faults.silence = random.choice([0, 0, 0.002, 0.005]) * rare
+    faults.silence = random.choice([0, 0, 0.005, 0.01]) * rare
     faults.silence_time = random.choice([0.2, 1.0, 4.0, 10.0])
     if severity != "standing":
         scale = 1.0 if severity == "harsh" else 0.1
@@ -259,7 +263,7 @@ class Run:
 
     async def read(self, seconds: float) -> None:
         for _ in range(self.random.randint(1, 4)):
-            row, values = self.random.choice(READS)
+            row, values = self.random.choice(self.plan.reads)
             timeout = self.random.choice([None, 0.1, PATIENT, PATIENT])
             self.spawn(self._read(row, self.random.choice(values), timeout, *draw_how(self.random)))
 
@@ -279,7 +283,7 @@ class Run:
             await asyncio.sleep(self.random.choice(MOMENTS))
 
     async def sleep(self, seconds: float) -> None:
-        await asyncio.sleep(seconds)
+        await asyncio.sleep(seconds * self.random.choice([1, 1, 5]))
 
     def strike(self) -> None:
         """The power fails for a moment, or the cable is pulled."""
@@ -314,6 +318,7 @@ class Run:
             ending.cancel()
             await asyncio.wait([ending])
             self.complain()
+            check_jogs(self.record, self.seen, self.sim, self.plan)
             raise Violation(f"not everything ended within {LONG} s on a {where}: {waiting}")
 
         ending.result()
@@ -566,7 +571,12 @@ async def play(seed: int, trace: Callable[[str], None] | None = None) -> Outcome
         seen = Observed(sim, loop.time, random, trace, plan.late)
         runs: list[Run] = []
         playing = loop.create_task(connected(plan, random, sim, record, seen, runs))
-        await asyncio.wait([playing])
+        await asyncio.wait([playing], timeout=ENDLESS)
+        if not playing.done():
+            playing.cancel()
+            await asyncio.wait([playing])
+            raise Violation("calls go on for ever on a line that is bad now and then")
+
         error = None if playing.cancelled() else playing.exception()
         try:
             if plan.disaster == "leave":
@@ -582,13 +592,19 @@ async def play(seed: int, trace: Callable[[str], None] | None = None) -> Outcome
                     await asyncio.wait(run.tasks)
 
         if plan.disaster == "unplug":
-            async with Magician.connect(sim.url, timeout=PATIENT) as arm:
-                await arm.recover()
-                await arm.move_to(220, 0, 40)
+            await asyncio.wait_for(again(sim), LONG)
 
         judge(record, seen, sim, plan)
         doubled = len(sim.arm.executed) - len({(each.index, each.value) for each in sim.arm.executed})
         return Outcome(loop.time(), seen.sent, len(sim.arm.executed), doubled, len(record.failed), len(sim.outages))
+
+
+async def again(sim: Simulation) -> None:
+    """Another program connects to an arm whose cable was pulled, perhaps in the middle of a jog, and moves it."""
+    async with Magician.connect(sim.url, timeout=PATIENT) as arm:
+        await arm.stop()
+        await arm.recover()
+        await arm.move_to(220, 0, 40)
 
 
 async def connected(
