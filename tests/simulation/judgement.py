@@ -147,8 +147,9 @@ def judge_answer(call: Call, row: Any, value: Any, seen: Observed, plan: Plan) -
     """Raises Violation unless a read got what the arm has said, after it was asked, and in the time that it had."""
     begun, ended = call.begun or 0.0, call.ended or 0.0
     if call.good and not seen.answered(row, value, call.value, begun - 2 * plan.disorder - TINY, ended + TINY):
-        made = [f"{time:.4f}" for time, each in seen.answers[row.id, value] if each == call.value]
-        raise Violation(f"an answer from before its question (made at {', '.join(made) or 'no time'}): {call}")
+        when = [time for time, each in seen.answers[row.id, value] if each == call.value and time <= ended]
+        last = f"last made at {when[-1]:.4f}" if when else "never made"
+        raise Violation(f"an answer from before its question ({last}): {call}")
 
     if call.timeout is not None and call.hurried is None and ended - begun > call.timeout + 0.1:
         raise Violation(f"took {ended - begun:.2f} s, with a timeout of {call.timeout} s: {call}")

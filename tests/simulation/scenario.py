@@ -325,6 +325,8 @@ class Run:
 
     async def end(self) -> None:
         """Waits for all that was begun, then moves once more."""
+        # A pause that was cancelled must not overtake this.
+        await asyncio.sleep(self.seen.good_from(self.now, 2 * self.plan.disorder) - self.now)
         await self.call("resume", self.arm.resume, how="plain")
         await self.all_told()
         if self.plan.disaster != "unplug":
