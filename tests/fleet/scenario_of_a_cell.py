@@ -2,15 +2,17 @@
 
     make soak OF=cell [SEEDS=10000] [FIRST=0]     runs many of them
 
-What must hold in each run: no two tools are ever in one zone, nobody hangs, no zone is held for ever, and all arms
-stand still soon after one has failed.
+What must hold in each run: no two tools are ever in one zone, nobody hangs, no zone is held for ever, all arms stand
+still soon after one has failed, as soon as their lines carry a stop to them, and a call whose time is over ends.
+
+In some runs lines stand still or fall silent, for times that no clock of the driver bounds.
 """
 
 from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import AsyncExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from random import Random
@@ -38,7 +40,8 @@ MODES = [PTPMode.MOVJ_XYZ, PTPMode.MOVL_XYZ, PTPMode.JUMP_XYZ, PTPMode.JUMP_MOVL
 AWAY = (150, -190, 60)
 NAMES = "abcde"
 LONG = 2000.0  # virtual seconds after which somebody hangs
-STANDING = 1.0  # virtual seconds after a failure until everybody stands still
+STANDING = 1.0  # virtual seconds of a good line after a failure until everybody stands still
+PROMPT = 2.0  # virtual seconds after its `asyncio.timeout` in which a call ends
 TICK = 0.01
 PATIENCE = 60.0  # seconds of the processor after which a run never ends
 TRIES = 20
@@ -97,7 +100,9 @@ class Run:
             watching.result()
 
         if self.fleet.failures:
-            await asyncio.sleep(STANDING)
+            loop = asyncio.get_running_loop()
+            standing = max(good_from(sim, loop.time(), STANDING) for sim in self.sims.values())
+            await asyncio.sleep(standing - loop.time())
             moving = [
                 name
                 for name, sim in self.sims.items()
@@ -157,9 +162,7 @@ class Run:
                     batch.wait(random.random())
                     batch.move_to(*random.choice(PLACES), mode=mode)
             case 2:
-                with suppress(TimeoutError):
-                    async with asyncio.timeout(random.random() / 5):
-                        await arm.move_to(*where, mode=mode)
+                await self.hurried(name, arm.move_to(*where, mode=mode), random.random() / 5)
             case 3:
                 motion = await arm.queue.move_to(*where, mode=mode)
                 await asyncio.sleep(random.random() / 5)
@@ -168,6 +171,22 @@ class Run:
                     await motion
             case _:
                 await arm.move_to(*where, mode=mode)
+
+    async def hurried(self, name: str, moving: Awaitable[None], seconds: float) -> None:
+        """A move with little time, which ends when that is over."""
+        limit = asyncio.timeout(seconds)
+        try:
+            async with limit:
+                await moving
+        except TimeoutError as error:
+            if not limit.expired():
+                raise
+
+            if isinstance(error, DobotError):
+                raise Violation(f"{name}: ended with {error!r} although its time was over") from error
+
+        if limit.expired() and asyncio.get_running_loop().time() > (limit.when() or 0.0) + PROMPT + TICK:
+            raise Violation(f"{name}: went on for more than {PROMPT} s after its time was over")
 
     async def strike(self) -> None:
         """A disaster, in half of the runs."""
@@ -202,6 +221,24 @@ class Run:
         return {zone: self.fleet.holders(zone) for zone in ZONES}
 
 
+def good_from(sim: Simulation, start: float, seconds: float) -> float:
+    """When an arm's line has carried everything for so many seconds without a break, from `start` on."""
+    at = start
+    for begun, ended in sorted(sim.outages):
+        if ended > at and begun < at + seconds:
+            at = ended
+
+    return at + seconds
+
+
+def worsen(faults: Faults, random: Random) -> None:
+    """Makes an open line one that stands still or falls silent now and then."""
+    faults.stall = random.choice([0.0, 0.0, 0.001, 0.003])
+    faults.silence = random.choice([0.0, 0.0, 0.0, 0.001])
+    faults.stall_time = random.choice([0.3, 1.0, 4.0])
+    faults.silence_time = random.choice([0.3, 1.0, 4.0])
+
+
 async def run(seed: int, say: Callable[[str], None]) -> Figures:
     """Runs a seed; returns what happened, and says which errors programs are told of."""
     random, loop = Random(seed), asyncio.get_running_loop()
@@ -221,6 +258,10 @@ async def run(seed: int, say: Callable[[str], None]) -> Figures:
         fleet = await stack.enter_async_context(Fleet.connect(members, zones=ZONES))
         for arm in NAMES:
             await fleet[arm].set_speed(random.choice([20, 50, 100]))
+
+        if random.random() < 0.5:
+            for sim in sims.values():
+                worsen(sim.faults, random)
 
         under_way = Run(random, sims, fleet, random.randint(3, 9), random.random() < 0.5, say)
         await under_way.play()

@@ -32,6 +32,7 @@ __all__ = ["Outcome", "Plan", "Violation", "run_seed"]
 SPEED = 20.0
 LONG = 120.0  # virtual seconds within which everything completes once the line is good again
 PATIENT = 60.0  # virtual seconds that a read may take on a bad line
+ASKED = 8  # times that something is asked while the line comes back
 LEAVING = 4.0  # virtual seconds that leaving the connection's block by an error may take, the closing included
 ENDLESS = 3000.0  # virtual seconds in which a program ends that waits for nothing but calls and moments
 WALL = 30  # seconds after which a run counts as endless
@@ -325,12 +326,25 @@ class Run:
 
     async def end(self) -> None:
         """Waits for all that was begun, then moves once more."""
-        # A pause that was cancelled must not overtake this.
-        await asyncio.sleep(self.seen.good_from(self.now, 2 * self.plan.disorder) - self.now)
+        # A pause that was cancelled must not overtake the last resume.
+        good = self.seen.good_from(self.now, 2 * self.plan.disorder)
+        await self.impatient(good)
+        await asyncio.sleep(good - self.now)
+        for row, values in self.plan.reads:
+            self.spawn(self._read(row, values[0], PATIENT, "plain", 0.0))
+
         await self.call("resume", self.arm.resume, how="plain")
         await self.all_told()
         if self.plan.disaster != "unplug":
             await self.last_moves()
+
+    async def impatient(self, until: float) -> None:
+        """Asks until the line is good, each time for a moment: answers to all of it may come when nobody waits."""
+        for _ in range(ASKED):
+            for row, values in self.plan.reads if self.now < until else ():
+                self.spawn(self._read(row, values[0], 0.1, "plain", 0.0))
+
+            await asyncio.sleep((until - self.now) / 2)
 
     async def all_told(self) -> None:
         """Waits for every task and every Motion."""
