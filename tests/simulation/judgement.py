@@ -11,6 +11,7 @@ The bounds are those of the promise, and none is a constant of the driver:
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -31,6 +32,7 @@ __all__ = ["Fate", "Jogging", "Kind", "Record", "Standstill", "check_jogs", "jud
 
 Kind = Literal["move", "step", "far", "wait", "pwm"]
 Found = list[tuple[int, Executed]]
+NAME = re.compile(r"sim://arm[0-9]+")
 TINY = 1e-6
 UNHEARD = 3.0  # seconds of silence after which nobody can know what became of a motion
 SHORT = 0.7  # seconds of silence within which a question may fail that waits for its answer a little longer
@@ -116,9 +118,9 @@ class Record:
     pending: int = 0
 
     def note(self, text: str) -> None:
-        """Adds a line to the trace."""
+        """Adds a line to the trace; the names of simulations differ from run to run, and are left out."""
         if self.trace:
-            self.trace(f"{self.clock():10.4f} ... {text}")
+            self.trace(f"{self.clock():10.4f} ... {NAME.sub('sim:', text)}")
 
 
 def judge(record: Record, seen: Observed, sim: Simulation, plan: Plan) -> None:

@@ -21,6 +21,7 @@ __all__ = ["Observed"]
 
 Trace = Callable[[str], None]
 LEVELS = (0, 1)
+PINS = range(1, 21)
 ADC_RANGE = 4096
 APART = 60.0  # seconds between two late answers of one command, so that one of a key at a time is on the way
 DEAF = 0.3  # seconds without an answer from which on it is noted
@@ -123,11 +124,11 @@ class Observed:
                 self._change(row, frame)
 
             reply: bytes = answer(frame)
-            if row and not frame.queued:
+            if row and reply and not frame.queued:
                 value = row.request.decode(frame.params)
                 if frame.write:
                     self.performed.append((self.clock(), row, value))
-                elif reply:
+                else:
                     (made,) = Parser().feed(reply)
                     self.answers[row.id, value].append((self.clock(), row.reply.decode(made.params)))
 
@@ -141,7 +142,7 @@ class Observed:
     def _change(self, row: Any, frame: Frame) -> None:
         """An input is read as something else each time, so that an answer tells when it was made."""
         arm = self.sim.arm
-        if row in {c.GET_IODI, c.GET_IOADC}:
+        if row in {c.GET_IODI, c.GET_IOADC} and len(frame.params) == 1 and frame.params[0] in PINS:
             address = frame.params[0]
             times = len(self.answers[row.id, address])
             if row is c.GET_IODI:
