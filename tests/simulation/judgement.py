@@ -298,8 +298,8 @@ def check_jogs(record: Record, seen: Observed, sim: Simulation, plan: Plan) -> N
             continue
 
         limit = seen.good_from(over, heard_within(plan))
-        if plan.disaster == "unplug" and limit >= record.struck_at:
-            continue
+        if limit >= min(record.left_at, record.struck_at if plan.disaster == "unplug" else math.inf):
+            continue  # who has no connection any more can stop nothing
 
         if ours[-1].call.good and ours[-1].call.ended is not None:
             limit = min(limit, ours[-1].call.ended)
