@@ -48,8 +48,8 @@ def test_seeds_that_once_broke_a_promise(seed: int) -> None:
 def test_a_seed_means_the_same_every_time() -> None:
     first: list[str] = []
     second: list[str] = []
-    run_seed(7, first.append)
-    run_seed(7, second.append)
+    run_seed(4, first.append)
+    run_seed(4, second.append)
     assert len(first) > 20
     # Names of simulations and tasks differ; what goes over the line does not.
     assert first == second

@@ -406,6 +406,7 @@ def test_a_harmless_alarm_ends_nothing() -> None:
 def test_a_jog_ends_when_the_key_is_let_go() -> None:
     bench = Bench()
     assert bench.device.begin_aside(jog(500.0))
+    assert bench.device.beside is not None
     assert bench.until(0.5).joints == pytest.approx((25, 0))
     bench.until(1.0).end_aside()
     assert bench.until(5.0).joints == pytest.approx((75, 0))

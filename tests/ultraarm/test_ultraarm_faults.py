@@ -233,7 +233,7 @@ def test_many_moves_on_a_terrible_line(seed: int, acknowledge: Any) -> None:
     """Whole messages are lost, split, merged and held back; none of them is changed, for a line has no checksum."""
 
     async def run() -> None:
-        faults = Faults(loss=0.05, split=0.1, merge=0.1, stall=0.01, latency=0.003)
+        faults = Faults(loss=0.05, split=0.1, merge=0.1, stall=0.01, stall_time=0.3, latency=0.003)
         options = DeviceOptions(20, False, 1, 0, power_up_alarms=frozenset())
         quirks = UltraArmQuirks(acknowledge=acknowledge)
         async with (
