@@ -1,0 +1,188 @@
+"""The three families as the promises see them: a simulated arm, the driver, and the line between them.
+
+What a test may know of an arm is what the simulated arm says of itself (`sim.arm`), and what the driver's public API
+offers. Where a name of either differs from family to family, it stands here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+from promise_clock import now
+from promise_line import Lines, Manner, PromiseLine, promise_lines
+
+from dobot_async import DobotError, Jog, Magician, MyCobot, UltraArm, UltraArmJog
+from dobot_async.magician import commands as magician
+from dobot_async.mycobot import commands as mycobot
+from dobot_async.simulator import Simulation, simulate
+from dobot_async.ultraarm import commands as ultraarm
+
+__all__ = ["BY_NAME", "FAMILIES", "Bench", "Family", "bench", "each_family", "latencies", "motions_done", "stands"]
+
+
+@dataclass(frozen=True)
+class Family:
+    """One family.
+
+    Attributes:
+        name: Its name.
+        model: What `simulate` calls it.
+        kind: Its class.
+        near: Joints near the place where it wakes up.
+        far: Joints far from it.
+        row: A row of its table that reads.
+        jog: A direction with a long way to go.
+        read: Asks it something.
+        slow: The simulator's speed at which the way from near to far takes minutes.
+    """
+
+    name: str
+    model: str
+    kind: Any
+    near: tuple[float, ...]
+    far: tuple[float, ...]
+    row: Any
+    jog: Any
+    read: Callable[[Any], Awaitable[Any]]
+    slow: float
+
+    def connect(self, url: str, **options: Any) -> AbstractAsyncContextManager[Any]:
+        """Its `connect`."""
+        connection: AbstractAsyncContextManager[Any] = self.kind.connect(url, **options)
+        return connection
+
+
+FAMILIES = (
+    Family(
+        name="magician",
+        model="magician",
+        kind=Magician,
+        near=(0, 40, 40, 0),
+        far=(85, 40, 40, 0),
+        row=magician.GET_POSE,
+        jog=Jog.J1_PLUS,
+        read=lambda arm: arm.get_pose(),
+        slow=0.01,
+    ),
+    Family(
+        name="mycobot",
+        model="mycobot280",
+        kind=MyCobot,
+        near=(10, 0, 0, 0, 0, 0),
+        far=(150, 0, 0, 0, 0, 0),
+        row=mycobot.GET_ANGLES,
+        jog="j1+",
+        read=lambda arm: arm.get_angles(),
+        slow=0.02,
+    ),
+    Family(
+        name="ultraarm",
+        model="ultraarm",
+        kind=UltraArm,
+        near=(10, 10, 10),
+        far=(160, 10, 10),
+        row=ultraarm.GET_ANGLES,
+        jog=UltraArmJog.J1_PLUS,
+        read=lambda arm: arm.get_angles(),
+        slow=0.02,
+    ),
+)
+BY_NAME = {family.name: family for family in FAMILIES}
+each_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
+latencies = Manner(latency=0.01)
+
+
+@dataclass
+class Bench:
+    """A simulated arm, the driver, and the lines between them."""
+
+    family: Family
+    sim: Simulation
+    arm: Any
+    lines: Lines
+
+    @property
+    def line(self) -> PromiseLine:
+        """The first line, which is the driver's unless it has opened another one."""
+        return self.lines[0]
+
+    async def works_again(self, within: float = 10.0) -> None:
+        """Asks the arm until it answers; fails if it has not within so many seconds."""
+        ends = now() + within
+        while True:
+            try:
+                async with asyncio.timeout_at(ends):
+                    await self.family.read(self.arm)
+                    return
+            except (DobotError, TimeoutError) as error:
+                assert now() < ends, f"it does not work again within {within:g} s: {error!r}"
+                await asyncio.sleep(0.05)
+
+    async def second_connection_works(self) -> None:
+        """Another program connects, asks the arm something and leaves."""
+        async with asyncio.timeout(10), self.family.connect(self.sim.url, control=False) as other:
+            await self.family.read(other)
+
+
+@asynccontextmanager
+async def bench(
+    family: Family,
+    *,
+    speed: float = 1.0,
+    manner: Manner | None = None,
+    seed: int = 0,
+    details: dict[str, Any] | None = None,
+    **options: Any,
+) -> AsyncIterator[Bench]:
+    """A simulated arm, and the driver connected to it.
+
+    Args:
+        family: Whose.
+        speed: Simulated seconds per second.
+        manner: What the line does; by default each message takes 10 ms.
+        seed: Of the line.
+        details: What `simulate` takes beside this.
+        options: What `connect` takes.
+    """
+    with promise_lines(manner or latencies, seed=seed) as lines:
+        async with (
+            simulate(family.model, speed=speed, **(details or {})) as sim,
+            family.connect(sim.url, **options) as arm,
+        ):
+            yield Bench(family, sim, arm, lines)
+
+
+def place(sim: Simulation) -> tuple[float, ...]:
+    """The joints of the simulated arm."""
+    joints: tuple[float, ...] = tuple(sim.arm.device.joints)
+    return joints
+
+
+def motions_done(sim: Simulation) -> int:
+    """How many commands that move it the arm has executed to the end."""
+    return sum(each.outcome == "done" and bool(each.command.moves) for each in sim.arm.executed)
+
+
+async def stands(sim: Simulation, *, seconds: float = 5.0) -> str:
+    """Watches a simulated arm; returns what it does although it should stand, "" if it stands."""
+    before, done = place(sim), motions_done(sim)
+    ends = now() + seconds
+    while True:
+        if place(sim) != before:
+            return f"it moves, from {before} to {place(sim)}"
+
+        if motions_done(sim) != done:
+            return f"it has executed {sim.arm.executed[-1].name}"
+
+        if sim.arm.device.moving:
+            return "a motion or a jog goes on"
+
+        if now() >= ends:
+            return ""
+
+        await asyncio.sleep(0.25)
