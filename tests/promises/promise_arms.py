@@ -22,7 +22,7 @@ from dobot_async.mycobot import commands as mycobot
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.ultraarm import commands as ultraarm
 
-__all__ = ["BY_NAME", "FAMILIES", "Bench", "Family", "bench", "each_family", "latencies", "motions_done", "stands"]
+__all__ = ["BY_NAME", "FAMILIES", "Bench", "Family", "bench", "each_family", "latencies", "motions_done", "simulated", "stands"]
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ FAMILIES = (
         row=mycobot.GET_ANGLES,
         jog="j1+",
         read=lambda arm: arm.get_angles(),
-        slow=0.02,
+        slow=0.05,  # more slowly, and it would not be seen to set out
     ),
     Family(
         name="ultraarm",
@@ -105,6 +105,7 @@ class Bench:
     sim: Simulation
     arm: Any
     lines: Lines
+    options: dict[str, Any]
 
     @property
     def line(self) -> PromiseLine:
@@ -125,8 +126,23 @@ class Bench:
 
     async def second_connection_works(self) -> None:
         """Another program connects, asks the arm something and leaves."""
-        async with asyncio.timeout(10), self.family.connect(self.sim.url, control=False) as other:
+        async with asyncio.timeout(10), self.family.connect(self.sim.url, **(self.options | {"control": False})) as other:
             await self.family.read(other)
+
+
+@asynccontextmanager
+async def simulated(
+    family: Family,
+    *,
+    speed: float = 1.0,
+    manner: Manner | None = None,
+    seed: int = 0,
+    details: dict[str, Any] | None = None,
+) -> AsyncIterator[tuple[Simulation, Lines]]:
+    """A simulated arm, and the lines over which it will be reached; takes what `bench` takes."""
+    with promise_lines(manner or latencies, seed=seed) as lines:
+        async with simulate(family.model, speed=speed, **(details or {})) as sim:
+            yield sim, lines
 
 
 @asynccontextmanager
@@ -149,12 +165,11 @@ async def bench(
         details: What `simulate` takes beside this.
         options: What `connect` takes.
     """
-    with promise_lines(manner or latencies, seed=seed) as lines:
-        async with (
-            simulate(family.model, speed=speed, **(details or {})) as sim,
-            family.connect(sim.url, **options) as arm,
-        ):
-            yield Bench(family, sim, arm, lines)
+    async with (
+        simulated(family, speed=speed, manner=manner, seed=seed, details=details) as (sim, lines),
+        family.connect(sim.url, **options) as arm,
+    ):
+        yield Bench(family, sim, arm, lines, options)
 
 
 def place(sim: Simulation) -> tuple[float, ...]:

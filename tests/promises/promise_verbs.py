@@ -56,6 +56,7 @@ class Verb:
         moments: When the line goes dead: seconds after the call began.
         prepare: What has to be done before, on a good line.
         at_once: It may return although the line is dead, for all that it needs is on this side.
+        refused: It may say at once that this arm cannot do it.
         model: Another model than the family's.
         core: All ways to end it are tried in the quick form too.
         what: Which part of it, where there are several.
@@ -66,6 +67,7 @@ class Verb:
     moments: Mapping[str, float] = field(default_factory=lambda: SHORT)
     prepare: Callable[[Any], Awaitable[Any]] | None = None
     at_once: bool = False
+    refused: bool = False
     model: str = ""
     core: bool = False
     what: str = ""
@@ -152,19 +154,21 @@ def shared(family: Family) -> list[Verb]:
     """What all families have."""
     far = family.far
     hosted = family.name == "mycobot"
+    alone = family.name == "ultraarm"  # it can neither pause nor forget what is queued
 
     async def prepared(arm: Any) -> Any:
         return await queued(arm, far)
 
     async def paused(arm: Any) -> Any:
         await queued(arm, far)
-        await arm.queue.pause()
+        if not alone:
+            await arm.queue.pause()
 
     def core(name: str, call: Call, moments: Mapping[str, float] = SHORT, **details: Any) -> Verb:
         return Verb(name, call, moments, core=True, **details)
 
     return [
-        *two("home", hosted=hosted),
+        *two("home", hosted=hosted, prepare=prepared),
         core("move_joints", lambda arm, _: arm.move_joints(*far), LONG),
         core("move_joints", lambda arm, _: arm.move_joints(*far, timeout=60), LONG, what="with a timeout"),
         Verb("queue.move_joints", lambda arm, _: arm.queue.move_joints(*far), SHORT, at_once=hosted, core=True),
@@ -180,14 +184,13 @@ def shared(family: Family) -> list[Verb]:
         Verb("queue.join", lambda arm, _: arm.queue.join(timeout=60), LONG, prepare=prepared, what="with a timeout"),
         Verb("queue.join", run_on, LONG, prepare=prepared, what="twice at a time"),
         core("queue.stop", lambda arm, _: arm.queue.stop(), prepare=prepared),
-        Verb("queue.clear", lambda arm, _: arm.queue.clear(), SHORT, prepare=prepared, at_once=hosted),
-        Verb("queue.pause", lambda arm, _: arm.queue.pause(), SHORT, prepare=prepared),
+        Verb("queue.clear", lambda arm, _: arm.queue.clear(), SHORT, prepare=prepared, at_once=hosted or alone),
+        Verb("queue.pause", lambda arm, _: arm.queue.pause(), SHORT, prepare=prepared, refused=alone),
         Verb("queue.batch", lambda arm, _: batch(arm, far), SHORT, at_once=hosted, core=True, what="leaving"),
         Verb("motion.wait", lambda _, motion: motion.wait(), LONG, prepare=prepared, core=True),
         Verb("motion.wait", lambda _, motion: motion.wait(60), LONG, prepare=prepared, what="with a timeout"),
         Verb("motion.__await__", lambda _, motion: waited(motion), LONG, prepare=prepared, core=True),
-        # Whether a family can pause is its own affair; where it can, both are there.
-        Verb("queue.resume", lambda arm, _: arm.queue.resume(), SHORT, prepare=paused),
+        Verb("queue.resume", lambda arm, _: arm.queue.resume(), SHORT, prepare=paused, refused=alone),
     ]
 
 
@@ -349,8 +352,8 @@ def ultraarm() -> list[Verb]:
         ),
         Verb("clear_alarms", lambda arm, _: arm.clear_alarms(), SHORT, moving, core=True),
         Verb("recover", lambda arm, _: arm.recover(), SHORT, moving, core=True),
-        Verb("pause", lambda arm, _: arm.pause(), SHORT, moving),
-        Verb("resume", lambda arm, _: arm.resume()),
+        Verb("pause", lambda arm, _: arm.pause(), SHORT, moving, refused=True),
+        Verb("resume", lambda arm, _: arm.resume(), refused=True),
         Verb("jog_stop", lambda arm, _: arm.jog_stop(), SHORT, moving),
         Verb("run_gcode", lambda arm, _: gcode(arm), LONG, core=True),
         Verb("run_gcode", lambda arm, _: gcode_lines(arm), LONG, what="line by line"),

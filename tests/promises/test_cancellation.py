@@ -103,7 +103,9 @@ async def fault_of(b: Bench, verb: Verb, moment: str, ender: str) -> str:
 
     at = dead_at + PATIENCE
     ended = await end(lambda: verb.call(b.arm, prepared), at)
-    if verb.at_once and ended.seconds < at and not ended.error:
+    if ended.seconds < at and (
+        (verb.at_once and not ended.error) or (verb.refused and not isinstance(ended.error, TimeoutError))
+    ):
         pass
     elif ended.seconds < at - SLACK:
         return f"ended before it was: {ended}"
@@ -260,15 +262,21 @@ async def test_a_cancellation_while_a_block_is_being_left_goes_on(family: Family
 @each_family
 @on_virtual_clock
 async def test_what_went_wrong_while_stopping_is_a_note(family: Family) -> None:
+    notes: list[str] = []
+
+    async def moved(arm: Any) -> None:
+        try:
+            await arm.move_joints(*family.far)
+        except BaseException as error:
+            notes.extend(getattr(error, "__notes__", ()))
+            raise
+
     async with bench(family, speed=0.1) as b:
-        task = asyncio.ensure_future(b.arm.move_joints(*family.far))
+        task = asyncio.ensure_future(moved(b.arm))
         await asyncio.sleep(0.5)
         b.line.die()
         task.cancel()
-        await asyncio.wait([task], timeout=GIVE_UP)
-        with pytest.raises(asyncio.CancelledError) as caught:
-            await task
-
-        notes = getattr(caught.value, "__notes__", [])
-        assert notes, "the CancelledError says nothing of a stop that nobody has heard"
+        ended = await end_of(task, GIVE_UP)
         b.line.recover()
+        assert ended.cancelled, ended
+        assert notes, "the CancelledError says nothing of a stop that nobody has heard"
