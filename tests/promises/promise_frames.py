@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterator
 HEADER = b"\xaa\xaa"
 GET_DEVICE_TIME, GET_POSE, GET_POSE_L, GET_IOADC = 4, 10, 13, 134
 COARSE = 256.0  # seconds in the first of a pair of floats, so that the second keeps its microseconds
-TICKS = 0.01  # seconds; the two bytes of an analog value hold eleven minutes of them
-ROUND = TICKS * 65536
+VALUES = 4096  # of an analog input
+TICKS = 0.05  # seconds from one of them to the next, which makes three minutes
+ROUND = TICKS * VALUES
 
 __all__ = ["DATED", "analog_age", "count", "dated", "pose_age", "pose_l_age", "time_age"]
 
@@ -55,7 +56,7 @@ DATED: dict[int, Callable[[bytes, float], bytes]] = {
     GET_DEVICE_TIME: lambda _, now: struct.pack("<I", int(now * 1000) % 2**32),
     GET_POSE: stamp_pose,
     GET_POSE_L: lambda _, now: struct.pack("<f", now % COARSE),
-    GET_IOADC: lambda params, now: params[:1] + struct.pack("<H", int(now / TICKS) % 65536),
+    GET_IOADC: lambda params, now: params[:1] + struct.pack("<H", int(now / TICKS) % VALUES),
 }
 """What becomes of the parameters of a reply."""
 
@@ -81,5 +82,5 @@ def pose_l_age(value: float, asked: float) -> float:
 
 
 def analog_age(value: object, asked: float) -> float:
-    """The same of an analog input, up to five minutes."""
+    """The same of an analog input, up to a minute and a half."""
     return signed(asked - (getattr(value, "value") + 1) * TICKS, ROUND)  # noqa: B009

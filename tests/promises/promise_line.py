@@ -143,7 +143,7 @@ class PromiseLine:
         self._random = random
         self._loop = asyncio.get_running_loop()
         self.opened_at = self._loop.time()
-        self._still_until = 0.0
+        self._stalled = False
         self._broken = self._closed = False
         self._to_arm: asyncio.Queue[bytes] = asyncio.Queue()
         self._arrived: asyncio.Queue[bytes | None] = asyncio.Queue()
@@ -183,6 +183,13 @@ class PromiseLine:
         await asyncio.wait(self._tasks)
         await self._inner.aclose()
 
+    def change(self, manner: Manner) -> None:
+        """From now on it does something else to messages; it may become one for datagrams."""
+        for name in Manner.__slots__:  # type: ignore[attr-defined]
+            setattr(self._manner, name, getattr(manner, name))
+
+        self.disorder = self.reorder_window = manner.spread
+
     def die(self) -> None:
         """From now on all is lost, also what is on the way; the connection stays open."""
         self.up.dead = self.down.dead = True
@@ -207,16 +214,16 @@ class PromiseLine:
 
     def _happen(self) -> None:
         """Lets the line stand still now and then."""
-        if not self._manner.stall or self._random.random() >= self._manner.stall:
+        if self._stalled or not self._manner.stall or self._random.random() >= self._manner.stall:
             return
 
-        length = self._random.expovariate(1 / self._manner.stalled)
-        self._still_until = max(self._still_until, self._loop.time() + length)
+        self._stalled = True
         self.stand_still()
-        self._loop.call_at(self._still_until, self._end_stall)
+        self._loop.call_later(self._random.expovariate(1 / self._manner.stalled), self._end_stall)
 
     def _end_stall(self) -> None:
-        if self._loop.time() >= self._still_until and not self._closed:
+        self._stalled = False
+        if not self._closed:
             self.up.go_on()
             self.down.go_on()
 
@@ -229,9 +236,9 @@ class PromiseLine:
         """Puts the arm's replies on the line."""
         try:
             while True:
-                replies = self.stamp(await self._inner.receive())
+                replies = await self._inner.receive()
                 self._happen()
-                self.down.send(replies)
+                self.down.send(self.stamp(replies))
         except (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceError):
             self.break_off()
 
