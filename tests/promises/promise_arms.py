@@ -22,7 +22,18 @@ from dobot_async.mycobot import commands as mycobot
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.ultraarm import commands as ultraarm
 
-__all__ = ["BY_NAME", "FAMILIES", "Bench", "Family", "bench", "each_family", "latencies", "motions_done", "simulated", "stands"]
+__all__ = [
+    "BY_NAME",
+    "FAMILIES",
+    "Bench",
+    "Family",
+    "bench",
+    "each_family",
+    "latencies",
+    "motions_done",
+    "simulated",
+    "stands",
+]
 
 
 @dataclass(frozen=True)
@@ -126,7 +137,10 @@ class Bench:
 
     async def second_connection_works(self) -> None:
         """Another program connects, asks the arm something and leaves."""
-        async with asyncio.timeout(10), self.family.connect(self.sim.url, **(self.options | {"control": False})) as other:
+        async with (
+            asyncio.timeout(10),
+            self.family.connect(self.sim.url, **(self.options | {"control": False})) as other,
+        ):
             await self.family.read(other)
 
 
@@ -142,7 +156,12 @@ async def simulated(
     """A simulated arm, and the lines over which it will be reached; takes what `bench` takes."""
     with promise_lines(manner or latencies, seed=seed) as lines:
         async with simulate(family.model, speed=speed, **(details or {})) as sim:
-            yield sim, lines
+            try:
+                yield sim, lines
+            finally:
+                for line in lines:
+                    if not line.closed:  # the test says so itself where it matters
+                        await line.aclose()
 
 
 @asynccontextmanager

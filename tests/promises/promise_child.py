@@ -13,11 +13,17 @@ CALLS = ("move", "jog", "queue")
 __all__ = ["CALLS"]
 
 
+def say() -> None:
+    """Tells who started this program that it may be interrupted now."""
+    sys.stdout.write("under way\n")
+    sys.stdout.flush()
+
+
 async def main(name: str, url: str, call: str) -> None:
     """Connects and does what takes long."""
     family = BY_NAME[name]
     async with family.connect(url) as arm:
-        asyncio.get_running_loop().call_later(0.2, lambda: print("under way", flush=True))
+        asyncio.get_running_loop().call_later(0.2, say)
         if call == "move":
             await arm.move_joints(*family.far)
         elif call == "jog":

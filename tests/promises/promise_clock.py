@@ -26,7 +26,7 @@ SPIN = 0.001  # seconds that each further turn then takes
 __all__ = ["LIMIT", "Ended", "end_of", "now", "on_virtual_clock", "run_on_virtual_clock"]
 
 
-class VirtualLoop(async_solipsism.EventLoop):  # type: ignore[misc] - it has no types
+class VirtualLoop(async_solipsism.EventLoop):  # type: ignore[misc]  # it has no types
     """A loop whose clock jumps to the next thing that happens, and that nobody can halt."""
 
     def __init__(self) -> None:

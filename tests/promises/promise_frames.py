@@ -1,12 +1,13 @@
 """Just enough of a Magician's frames to date its answers: written apart from the driver, whose parser is on trial.
 
-    AA AA | length | id | ctrl | parameters | checksum        length counts id, ctrl and parameters
+AA AA | length | id | ctrl | parameters | checksum        length counts id, ctrl and parameters
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterator
+from typing import Any
 
 HEADER = b"\xaa\xaa"
 GET_DEVICE_TIME, GET_POSE, GET_POSE_L, GET_IOADC = 4, 10, 13, 134
@@ -71,9 +72,9 @@ def time_age(value: int, asked: float) -> float:
     return asked - (value + 1) / 1000
 
 
-def pose_age(value: object, asked: float) -> float:
+def pose_age(value: Any, asked: float) -> float:
     """The same of a pose."""
-    return asked - (getattr(value, "x") + getattr(value, "y"))  # noqa: B009 - a family's own type
+    return asked - float(value.x + value.y)
 
 
 def pose_l_age(value: float, asked: float) -> float:
@@ -81,6 +82,6 @@ def pose_l_age(value: float, asked: float) -> float:
     return signed(asked - value, COARSE)
 
 
-def analog_age(value: object, asked: float) -> float:
+def analog_age(value: Any, asked: float) -> float:
     """The same of an analog input, up to a minute and a half."""
-    return signed(asked - (getattr(value, "value") + 1) * TICKS, ROUND)  # noqa: B009
+    return signed(asked - (value.value + 1) * TICKS, ROUND)

@@ -129,7 +129,7 @@ class PromiseLine:
         up: To the arm.
         down: To the driver.
         stamp: What becomes of replies at the moment when the arm has made them.
-        opened_at: When it was opened.
+        closed: Whether the driver has closed it.
     """
 
     def __init__(self, inner: Transport, manner: Manner, random: Random) -> None:
@@ -142,9 +142,8 @@ class PromiseLine:
         self._manner = manner
         self._random = random
         self._loop = asyncio.get_running_loop()
-        self.opened_at = self._loop.time()
         self._stalled = False
-        self._broken = self._closed = False
+        self._broken = self.closed = False
         self._to_arm: asyncio.Queue[bytes] = asyncio.Queue()
         self._arrived: asyncio.Queue[bytes | None] = asyncio.Queue()
         self.up = Direction(manner, random, self._to_arm.put_nowait)
@@ -153,7 +152,7 @@ class PromiseLine:
 
     async def send(self, data: bytes) -> None:
         """Puts a message on the line; it never waits, as a socket with room in its buffer."""
-        if self._closed:
+        if self.closed:
             raise anyio.ClosedResourceError
 
         if self._broken:
@@ -167,13 +166,13 @@ class PromiseLine:
         data = await self._arrived.get()
         if data is None:
             self._arrived.put_nowait(None)
-            raise anyio.ClosedResourceError if self._closed else anyio.EndOfStream
+            raise anyio.ClosedResourceError if self.closed else anyio.EndOfStream
 
         return data
 
     async def aclose(self) -> None:
         """Closes the line; what is on the way arrives no more."""
-        self._closed = True
+        self.closed = True
         self.up.forget()
         self.down.forget()
         self._arrived.put_nowait(None)
@@ -185,7 +184,7 @@ class PromiseLine:
 
     def change(self, manner: Manner) -> None:
         """From now on it does something else to messages; it may become one for datagrams."""
-        for name in Manner.__slots__:  # type: ignore[attr-defined]
+        for name in Manner.__slots__:
             setattr(self._manner, name, getattr(manner, name))
 
         self.disorder = self.reorder_window = manner.spread
@@ -201,7 +200,7 @@ class PromiseLine:
 
     def recover(self) -> None:
         """All is well again; what was held back arrives."""
-        self.up.dead = self.down.dead = self._closed
+        self.up.dead = self.down.dead = self.closed
         self.up.go_on()
         self.down.go_on()
 
@@ -223,7 +222,7 @@ class PromiseLine:
 
     def _end_stall(self) -> None:
         self._stalled = False
-        if not self._closed:
+        if not self.closed:
             self.up.go_on()
             self.down.go_on()
 
@@ -249,17 +248,21 @@ class Lines(list[PromiseLine]):
     Attributes:
         manner: Of the lines that are opened from now on, each with a copy of it.
         refused: Whether nothing can be opened just now.
+        born_dead: Whether lines that are opened from now on are dead from the beginning.
     """
 
     def __init__(self, manner: Manner, seed: int) -> None:
         super().__init__()
         self.manner = manner
-        self.refused = False
+        self.refused = self.born_dead = False
         self._random = Random(seed)
 
     def add(self, inner: Transport) -> PromiseLine:
         """Puts a line before a transport."""
         self.append(PromiseLine(inner, replace(self.manner), self._random))
+        if self.born_dead:
+            self[-1].die()
+
         return self[-1]
 
 

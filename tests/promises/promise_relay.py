@@ -1,12 +1,15 @@
 """A TCP relay in real time, in this process or as one of its own: it may stand still, or be dead with the line open.
 
-python promise_relay.py PORT [--longest 60] [--seed 0]    relays 127.0.0.1:PORT, stands still now and then; prints its port
+python promise_relay.py PORT [--longest 60] [--seed 0]
+
+relays 127.0.0.1:PORT, stands still now and then, and says first at which port it listens.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from random import Random
@@ -98,7 +101,8 @@ async def main() -> None:
     options.add_argument("--seed", type=int, default=0)
     given = options.parse_args()
     async with relay_to(given.port) as relay:
-        print(relay.port, flush=True)
+        sys.stdout.write(f"{relay.port}\n")
+        sys.stdout.flush()
         await stall(relay, Random(given.seed), given.longest)
 
 

@@ -20,7 +20,7 @@ from promise_line import Manner
 from dobot_async import DobotError
 from dobot_async.magician import commands as c
 
-__all__ = ["KINDS", "Kind", "QUESTIONS", "Tally", "ask_until", "tally_of"]
+__all__ = ["KINDS", "QUESTIONS", "Kind", "Tally", "ask_until", "tally_of"]
 
 LATENCY = 0.004
 FRESH = 0.001  # seconds that an answer may be older than its question, for dates are rounded

@@ -13,7 +13,6 @@ from typing import Any
 
 from promise_arms import Family
 
-
 from dobot_async.magician import commands as m
 from dobot_async.mycobot import commands as y
 from dobot_async.ultraarm import commands as u
@@ -216,9 +215,7 @@ def magician() -> list[Verb]:
         read("get_output", 5, prepare=pin(m.IOFunction.DO)),
         read("get_adc", 5, prepare=pin(m.IOFunction.ADC)),
         read("get_color", prepare=lambda arm: arm.set_color_sensor(m.ColorPort.GP1)),
-        read(
-            "get_infrared", m.InfraredPort.GP1, prepare=lambda arm: arm.set_infrared_sensor(m.InfraredPort.GP1)
-        ),
+        read("get_infrared", m.InfraredPort.GP1, prepare=lambda arm: arm.set_infrared_sensor(m.InfraredPort.GP1)),
         read("set_color_sensor", m.ColorPort.GP1),
         read("set_infrared_sensor", m.InfraredPort.GP1),
         read("set_rail"),
@@ -417,5 +414,3 @@ def public_calls(kind: Any) -> set[str]:
         if not name.startswith("_")
         and (callable(found := inspect.getattr_static(kind, name)) or isinstance(found, (classmethod, staticmethod)))
     }
-
-

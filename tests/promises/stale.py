@@ -30,15 +30,23 @@ TURN = 120.0  # seconds after which it is as before
 WAY = 60.0  # mm
 
 
+def say(line: str) -> None:
+    """Writes a line at once."""
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
 def virtual(answers: int, first: int) -> int:
     """All kinds of lines in virtual time; returns how many answers were stale."""
     stale = 0
     for kind in KINDS:
         begun = time.monotonic()
         for calm in (True, False) if kind.most else (False,):
-            tally = tally_of(kind, answers // (2 * len(KINDS)) if kind.most else answers // len(KINDS), calm=calm, first=first)
+            tally = tally_of(
+                kind, answers // (2 * len(KINDS)) if kind.most else answers // len(KINDS), calm=calm, first=first
+            )
             how = "calm" if calm else "with cancellations"
-            print(f"{kind.name}, {how}: {tally} [{time.monotonic() - begun:.0f} s]", flush=True)
+            say(f"{kind.name}, {how}: {tally} [{time.monotonic() - begun:.0f} s]")
             stale += tally.stale
 
     return stale
@@ -124,7 +132,7 @@ def main() -> int:
     stale = virtual(given.answers, given.seed) if given.answers else 0
     if given.tcp:
         tally = asyncio.run(over_tcp(given.tcp, given.seed, given.longest))
-        print(f"tcp, stalls of up to {given.longest:g} s: {tally}")
+        say(f"tcp, stalls of up to {given.longest:g} s: {tally}")
         stale += tally.stale
 
     return 1 if stale else 0

@@ -1,8 +1,8 @@
 """An arm that does not answer on an open link: nothing is lost by that, and nothing is claimed.
 
-The link is not lost (`ConnectionLost` means that it is gone). Questions raise ReplyTimeout. Motions stay pending, or end
-as MotionUnknown together with a stop that reaches the arm within 1 s after the line is back; nobody is told that they
-are done. After it everything works again.
+The link is not lost (`ConnectionLost` means that it is gone). Questions raise ReplyTimeout. Motions stay pending, or
+end as MotionUnknown together with a stop that reaches the arm within 1 s after the line is back; nobody is told that
+they are done. After it everything works again.
 """
 
 from __future__ import annotations
@@ -78,10 +78,8 @@ async def test_motions_stay_pending_or_are_unknown(family: Family, fault: str, s
             assert all(isinstance(each, MotionUnknown | MotionStopped) for each in ended), ended
         else:
             # What was pending comes to its end: none of it is done before the arm has done it.
-            done = 0
-            for each in waiting:
+            for done, each in enumerate(waiting, 1):
                 await asyncio.wait_for(each, 300)
-                done += 1
                 assert motions_done(b.sim) >= done
 
             await asyncio.wait_for(joining, 10)
