@@ -1,4 +1,4 @@
-"""A virtual clock with a hard end, for a driver that may hang: neither a lost wake-up nor a swallowed cancellation does.
+"""A virtual clock with a hard end: no test hangs, whatever the driver on trial does.
 
 A test that waits for nothing fails at once (`async_solipsism`). One that goes on past its limit in virtual time is
 struck: the loop stops whatever the tasks do, for a driver that is wrong may refuse to be cancelled.
