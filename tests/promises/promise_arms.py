@@ -31,6 +31,7 @@ __all__ = [
     "each_family",
     "latencies",
     "motions_done",
+    "place",
     "simulated",
     "stands",
 ]
