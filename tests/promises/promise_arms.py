@@ -1,26 +1,24 @@
-"""The three families as the promises see them: a simulated arm, the driver, and the line between them.
+"""A simulated arm, the driver, and the line between them; and whether the arm stands.
 
 What a test may know of an arm is what the simulated arm says of itself (`sim.arm`), and what the driver's public API
-offers. Where a name of either differs from family to family, it stands here and nowhere else.
+offers. Where a name of either differs from family to family, it stands here or in `promise_families`.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import pytest
 from promise_clock import now
+from promise_families import BY_NAME, FAMILIES, Family
 from promise_line import Lines, Manner, PromiseLine, promise_lines
 
-from dobot_async import DobotError, Jog, Magician, MyCobot, UltraArm, UltraArmJog
-from dobot_async.magician import commands as magician
-from dobot_async.mycobot import commands as mycobot
+from dobot_async import DobotError
 from dobot_async.simulator import Simulation, simulate
-from dobot_async.ultraarm import commands as ultraarm
 
 __all__ = [
     "BY_NAME",
@@ -37,74 +35,6 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True)
-class Family:
-    """One family.
-
-    Attributes:
-        name: Its name.
-        model: What `simulate` calls it.
-        kind: Its class.
-        near: Joints near the place where it wakes up.
-        far: Joints far from it.
-        row: A row of its table that reads.
-        jog: A direction with a long way to go.
-        read: Asks it something.
-        slow: The simulator's speed at which the way from near to far takes minutes.
-    """
-
-    name: str
-    model: str
-    kind: Any
-    near: tuple[float, ...]
-    far: tuple[float, ...]
-    row: Any
-    jog: Any
-    read: Callable[[Any], Awaitable[Any]]
-    slow: float
-
-    def connect(self, url: str, **options: Any) -> AbstractAsyncContextManager[Any]:
-        """Its `connect`."""
-        connection: AbstractAsyncContextManager[Any] = self.kind.connect(url, **options)
-        return connection
-
-
-FAMILIES = (
-    Family(
-        name="magician",
-        model="magician",
-        kind=Magician,
-        near=(0, 40, 40, 0),
-        far=(85, 40, 40, 0),
-        row=magician.GET_POSE,
-        jog=Jog.J1_PLUS,
-        read=lambda arm: arm.get_pose(),
-        slow=0.01,
-    ),
-    Family(
-        name="mycobot",
-        model="mycobot280",
-        kind=MyCobot,
-        near=(10, 0, 0, 0, 0, 0),
-        far=(150, 0, 0, 0, 0, 0),
-        row=mycobot.GET_ANGLES,
-        jog="j1+",
-        read=lambda arm: arm.get_angles(),
-        slow=0.05,  # more slowly, and it would not be seen to set out
-    ),
-    Family(
-        name="ultraarm",
-        model="ultraarm",
-        kind=UltraArm,
-        near=(10, 10, 10),
-        far=(160, 10, 10),
-        row=ultraarm.GET_ANGLES,
-        jog=UltraArmJog.J1_PLUS,
-        read=lambda arm: arm.get_angles(),
-        slow=0.02,
-    ),
-)
-BY_NAME = {family.name: family for family in FAMILIES}
 each_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
 latencies = Manner(latency=0.01)
 

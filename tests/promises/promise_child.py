@@ -6,7 +6,7 @@ import asyncio
 import signal
 import sys
 
-from promise_arms import BY_NAME
+from promise_families import BY_NAME
 
 CALLS = ("move", "jog", "queue")
 

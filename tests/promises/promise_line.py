@@ -17,6 +17,7 @@ from random import Random
 from typing import Any
 
 import anyio
+from anyio.lowlevel import checkpoint
 
 from dobot_async.transports import SCHEMES, Transport
 
@@ -151,7 +152,8 @@ class PromiseLine:
         self._tasks = [asyncio.create_task(self._feed()), asyncio.create_task(self._pump())]
 
     async def send(self, data: bytes) -> None:
-        """Puts a message on the line; it never waits, as a socket with room in its buffer."""
+        """Puts a message on the line; a checkpoint as anyio's is: who is cancelled in it has sent nothing."""
+        await checkpoint()
         if self.closed:
             raise anyio.ClosedResourceError
 

@@ -233,7 +233,7 @@ async def test_each_call_on_a_lost_link_gets_an_error_of_its_own(family: Family)
 @on_virtual_clock
 async def test_commands_whose_motions_nobody_keeps_need_no_memory(family: Family) -> None:
     """What such a program tells often moves nothing; nobody ever asks how far the arm is."""
-    many, most = 3000, 1100
+    many, most = 2000, 1100
 
     def motions() -> int:
         gc.collect()

@@ -128,7 +128,7 @@ async def test_questions_raise_reply_timeout_and_are_answered_again(family: Fami
 
         await asyncio.sleep(silent_until - now())
         b.line.recover()
-        await b.works_again(within=2.0)
+        await b.works_again(within=5.0)
         assert b.arm.link.state.value is LinkState.OPEN
         await b.arm.move_joints(*family.near, timeout=60)
         assert motions_done(b.sim) == 1
