@@ -106,7 +106,7 @@ async def over_tcp(seconds: float, seed: int, longest: float) -> Tally:
                                 loop.time,
                                 questions=questions,
                                 fresh=5 * STEP,
-                                pause=1.0,
+                                pause=6.0,
                             )
                         )
 
