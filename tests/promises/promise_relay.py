@@ -22,14 +22,16 @@ class Relay:
 
     Attributes:
         dead: Whether all is read and thrown away.
-        flows: Set while it does not stand still.
+        up: Set while what clients send flows.
+        down: Set while what they are sent flows. One way may stand still alone, with a reply on it.
         port: Where it listens.
     """
 
     def __init__(self, port: int) -> None:
         self.dead = False
-        self.flows = asyncio.Event()
-        self.flows.set()
+        self.up, self.down = asyncio.Event(), asyncio.Event()
+        self.up.set()
+        self.down.set()
         self.port = 0
         self._to = port
         self._connections: set[asyncio.Task[None]] = set()
@@ -44,7 +46,10 @@ class Relay:
             there, back = await asyncio.open_connection("127.0.0.1", self._to)
             ends.append(back)
             await asyncio.wait(
-                [asyncio.create_task(self._copy(reader, back)), asyncio.create_task(self._copy(there, writer))],
+                [
+                    asyncio.create_task(self._copy(reader, back, self.up)),
+                    asyncio.create_task(self._copy(there, writer, self.down)),
+                ],
                 return_when=asyncio.FIRST_COMPLETED,
             )
         finally:
@@ -56,10 +61,10 @@ class Relay:
                 with suppress(OSError):
                     await each.wait_closed()
 
-    async def _copy(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _copy(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, flows: asyncio.Event) -> None:
         with suppress(OSError):
             while data := await reader.read(4096):
-                await self.flows.wait()
+                await flows.wait()
                 if not self.dead:
                     writer.write(data)
 
@@ -79,7 +84,8 @@ async def relay_to(port: int) -> AsyncIterator[Relay]:
         yield relay
     finally:
         server.close()
-        relay.flows.set()
+        relay.up.set()
+        relay.down.set()
         await relay.aclose()
         await server.wait_closed()
 
@@ -88,9 +94,13 @@ async def stall(relay: Relay, random: Random, longest: float) -> None:
     """Lets it stand still now and then: mostly for seconds, sometimes for up to the longest."""
     while True:
         await asyncio.sleep(random.expovariate(1 / 8))
-        relay.flows.clear()
+        ways = random.choice(((relay.up, relay.down), (relay.up,), (relay.down,)))
+        for way in ways:
+            way.clear()
+
         await asyncio.sleep(min(longest, random.choice((random.expovariate(1 / 4), random.random() * longest))))
-        relay.flows.set()
+        for way in ways:
+            way.set()
 
 
 async def main() -> None:
