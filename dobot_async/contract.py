@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
-from dobot_async.pending import Keyed
 from dobot_async.wire import Command
 
 __all__ = ["Encoder", "Frame", "LinkState", "LinkStats", "Parser", "Unexpected"]
 
 
-class Frame(Keyed, Protocol):
+class Frame(Protocol):
     """What a family's parser makes and its transport carries."""
+
+    @property
+    def key(self) -> Hashable:
+        """What requests and replies are matched by."""
 
     @property
     def params(self) -> bytes:
@@ -60,7 +64,7 @@ class LinkState(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Unexpected(Generic[F]):
-    """A frame that nobody waited for: late beyond its tombstone, of another client, or of no request at all."""
+    """A frame that nobody waited for: a copy, of another client, or of no request at all."""
 
     frame: F
 
@@ -72,7 +76,7 @@ class LinkStats:
     Attributes:
         sent: Requests, repeated ones included.
         received: Whole frames with a good checksum.
-        repeated: Requests that were sent again because no answer came.
+        repeated: Requests that were sent again.
         timeouts: Calls that failed because no answer came.
         unexpected: Frames that nobody waited for.
         junk_bytes: Bytes that belong to no frame.

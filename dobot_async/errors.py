@@ -15,8 +15,9 @@ Wrong arguments are `ValueError` or `TypeError` and are raised before a byte is 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 __all__ = [
     "ArmAlarm",
@@ -28,7 +29,10 @@ __all__ = [
     "MotionUnknown",
     "ProtocolError",
     "ReplyTimeout",
+    "another",
 ]
+
+E = TypeVar("E", bound=BaseException)
 
 
 class DobotError(Exception):
@@ -73,3 +77,13 @@ class MotionStopped(DobotError):
 
 class MotionUnknown(DobotError):
     """Nothing can tell whether the motion runs; the arm was told to stop."""
+
+
+def another(error: E) -> E:
+    """Return a copy of an error, to be raised by somebody else: a traceback and a context belong to one raise."""
+    found = copy.copy(error)
+    if hasattr(found, "__notes__"):
+        found.__notes__ = list(found.__notes__)
+
+    found.__cause__, found.__context__ = error.__cause__, None
+    return found.with_traceback(None)

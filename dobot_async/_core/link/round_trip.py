@@ -4,9 +4,7 @@
     later ones:        rttvar += (|srtt - r| - rttvar) / 4         srtt += (r - srtt) / 8
     timeout:           srtt + max(4 * rttvar, 10 ms), within floor and ceiling; a quarter longer after each that passes
 
-Only requests that were sent once give a sample: the answer to one that was sent again could belong to any sending. If
-it is the last but one's, the link has become slower; so the next timeout is at least a little more than that. It takes
-few requests until one is measured on a link that is slower by much, and a link that loses many stays fast.
+A sample is always that of one request and its own reply: none is sent again before it is known to have been lost.
 """
 
 from __future__ import annotations
@@ -17,7 +15,6 @@ INITIAL = 0.1
 GRAIN = 0.01  # however even the round trips are, the next one may be a little longer
 GROWTH = 1.25
 MOST_GROWTH = 4.0  # a timeout of half a second where a fiftieth would do makes a lossy link a dead one
-MARGIN = 1.1
 
 
 class RoundTrip:
@@ -36,27 +33,21 @@ class RoundTrip:
         self._ceiling = ceiling
         self._variation = 0.0
         self._growth = 1.0
-        self._least = 0.0
 
     @property
     def timeout(self) -> float:
         """Seconds to wait for the next answer."""
         base = INITIAL if self.smoothed is None else max(self.smoothed + max(4 * self._variation, GRAIN), self._floor)
-        return min(max(base * self._growth, self._least), self._ceiling)
+        return min(base * self._growth, self._ceiling)
 
     def unanswered(self) -> None:
-        """Takes note that a timeout has passed."""
+        """Take note that a timeout has passed."""
         self._growth = min(self._growth * GROWTH, MOST_GROWTH)
 
-    def probably(self, seconds: float) -> None:
-        """Takes how long ago the last but one sending was when a request that was sent again is answered."""
-        self._growth = 1.0
-        self._least = MARGIN * seconds
-
     def sample(self, seconds: float) -> None:
-        """Takes the round trip of a request that was sent once."""
+        """Take the round trip of a request; a standstill of the line says no more than that it was long."""
+        seconds = min(seconds, self._ceiling)
         self._growth = 1.0
-        self._least = 0.0
         if self.smoothed is None:
             self.smoothed, self._variation = seconds, seconds / 2
             return

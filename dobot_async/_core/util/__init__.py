@@ -1,0 +1,1 @@
+"""Pieces that know nothing of arms: tasks and hooks."""
