@@ -1,0 +1,1 @@
+"""Motions: the queue, its writer and its poller, and what a family brings to it."""

@@ -1,0 +1,105 @@
+"""What a family brings to the queue of motions: how its arm takes commands, says how far it is, and stops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from dobot_async._core.util.hooks import Hooks
+from dobot_async._core.util.tasks import Cleanup
+from dobot_async.errors import ArmAlarm, MotionUnknown
+from dobot_async.wire import Command
+
+__all__ = ["Entry", "Executor", "Source", "alarmed"]
+
+Q = TypeVar("Q")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    """One command on its way into the queue, checked and encoded before a byte is sent."""
+
+    command: Command[Any, Any]
+    value: Any
+    frame: Any
+
+
+class Source(Protocol):
+    """Where an executor gets the commands from, in order."""
+
+    def __len__(self) -> int:
+        """How many wait to be sent."""
+
+    def take(self) -> Entry:
+        """Return the next one, which is sent now; it can no longer be withdrawn."""
+
+    def put_back(self, entries: Sequence[Entry]) -> None:
+        """The arm is known not to have taken these: they come next again."""
+
+    def accepted(self, entry: Entry, ticket: int) -> None:
+        """The arm has taken one, and this is its number. Tickets grow."""
+
+
+class Executor(Protocol):
+    """One arm, as its queue sees it. Each call may be cancelled at any moment, and the next one goes on from there.
+
+    Attributes:
+        cleanup: What still has to be done to the arm.
+        on_unknown: Hooks, called when a motion turns out to be unknown while nobody asks.
+    """
+
+    cleanup: Cleanup
+    on_unknown: Hooks[[MotionUnknown]]
+
+    def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
+        """Return an entry for the queue.
+
+        Raises:
+            ValueError: The parameters do not fit, the target cannot be reached, or the command cannot be queued.
+            TypeError: They are of the wrong type.
+        """
+
+    async def submit(self, source: Source) -> None:
+        """Give commands to the arm, each exactly once and in order, until the source is empty; wait for room.
+
+        Raises:
+            MotionUnknown: Nothing can tell whether the arm took a command.
+            ArmAlarm: The arm has no room, and with the alarms that it has raised it will not make any.
+            CommandRejected: The arm refused the one that was taken last.
+            ReplyTimeout: The arm is silent; what was not sent is left in the source.
+        """
+
+    async def completed(self) -> int | None:
+        """Return the ticket of the last command that the arm has finished, None if it cannot say.
+
+        Raises:
+            MotionUnknown: The arm was switched off and on.
+            ReplyTimeout: The arm is silent.
+        """
+
+    async def earliest_end(self, entry: Entry) -> float | None:
+        """Return seconds within which a command, the next one to be finished, cannot be; None where nothing tells."""
+
+    async def alarms(self) -> Sequence[object]:
+        """Return the alarms that keep the arm from moving."""
+
+    async def is_at_target(self, entry: Entry) -> bool:
+        """Return whether the arm stands where a motion leads; False where the motion alone cannot tell."""
+
+    async def stop(self) -> None:
+        """Stop the arm where it is, ahead of everything; repeated until the arm has heard it."""
+
+    async def clear(self) -> None:
+        """Empty the arm's queue and let it run again; repeated until the arm has heard it."""
+
+    async def pause(self) -> None:
+        """Let the arm finish the command that it executes, and then wait."""
+
+    async def resume(self) -> None:
+        """Let the arm go on."""
+
+
+def alarmed(alarms: Sequence[object]) -> ArmAlarm:
+    """What to raise because of alarms."""
+    return ArmAlarm(f"the arm raised alarms: {'; '.join(map(str, alarms))}", alarms)

@@ -1,0 +1,117 @@
+"""The poller: one task that asks the arm how far it is, while somebody wants to know."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Protocol
+
+from dobot_async._core.util.tasks import cancel_and_join
+from dobot_async.errors import DobotError, MotionUnknown, ReplyTimeout
+
+__all__ = ["DENSE", "POLL", "SELDOM", "StatusPoller"]
+
+logger = logging.getLogger("dobot_async.queue")
+POLL = 0.003  # seconds between two looks at an arm of which nothing tells how long it still needs
+DENSE, SELDOM = 0.001, 0.05  # seconds from one look to the next, at the least and at the most
+ALARMS = 0.05  # seconds after which the alarms are read as well, for a motion that an alarm keeps from ending
+UNWATCHED = 100  # Motions that may be pending although nobody awaits one; beyond, the arm is asked all the same
+
+
+class Watched(Protocol):
+    """The queue, as far as the poller is concerned."""
+
+    @property
+    def pending(self) -> int:
+        """How many accepted commands are not known to have ended."""
+
+    async def look(self, *, alarms: bool) -> None:
+        """Ask the arm how far it is, and end the Motions that this decides."""
+
+    async def rest(self) -> float | None:
+        """Return seconds within which no Motion can end; None where nothing tells."""
+
+    def give_up(self, error: DobotError) -> None:
+        """End everything because of an error that nobody can mend."""
+
+
+class StatusPoller:
+    """Lives while somebody waits, or has just looked, or so much is pending that it would fill the memory."""
+
+    def __init__(self, queue: Watched) -> None:
+        self._queue = queue
+        self._watchers = 0
+        self._until = -math.inf
+        self._stirred = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+        self._clock = asyncio.get_running_loop().time
+
+    def watch(self, seconds: float = 0.0) -> None:
+        """Ask for so many seconds at least, or while there is another reason."""
+        self._until = max(self._until, self._clock() + seconds)
+        if self._wanted and (self._task is None or self._task.done()):
+            self._task = asyncio.create_task(self._poll(), name="dobot_async poller")
+
+    @contextmanager
+    def watching(self, after: float = 0.0) -> Iterator[None]:
+        """Ask while this is entered, once so many seconds have passed."""
+        self._watchers += 1
+        timer = asyncio.get_running_loop().call_later(after, self.watch)
+        if not after:
+            self.watch()
+
+        try:
+            yield
+        finally:
+            self._watchers -= 1
+            timer.cancel()
+
+    def stir(self) -> None:
+        """What the arm was to do is thrown away: it may have something shorter to do than was thought."""
+        self._stirred.set()
+
+    async def aclose(self) -> None:
+        """End it."""
+        if self._task:
+            await cancel_and_join(self._task)
+
+    @property
+    def _wanted(self) -> bool:
+        pending = self._queue.pending
+        return self._watchers > 0 or pending > UNWATCHED or (pending > 0 and self._clock() < self._until)
+
+    async def _poll(self) -> None:
+        alarms_at = -math.inf
+        try:
+            while self._wanted:
+                self._stirred.clear()
+                now, pause = self._clock(), POLL
+                alarms = now >= alarms_at + ALARMS
+                if alarms:
+                    alarms_at = now
+
+                try:
+                    await self._queue.look(alarms=alarms)
+                    least = await self._queue.rest()
+                    pause = POLL if least is None else min(least / 2, SELDOM)
+                except ReplyTimeout as error:
+                    what = "the arm no longer answers, and what it does cannot be seen"
+                    self._queue.give_up(MotionUnknown(f"{what}: {error}"))
+                except DobotError as error:
+                    self._queue.give_up(error)
+
+                await self._rest(max(pause, now + DENSE - self._clock()))
+        except Exception as error:
+            logger.exception("the poller failed")
+            self._queue.give_up(MotionUnknown(f"the driver failed while it watched the arm: {error!r}"))
+
+    async def _rest(self, seconds: float) -> None:
+        """Leave the arm alone, until it is stirred."""
+        await asyncio.sleep(min(seconds, POLL))
+        if seconds > POLL:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(seconds - POLL):
+                    await self._stirred.wait()

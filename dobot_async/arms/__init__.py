@@ -1,0 +1,1 @@
+"""What the arms of all families do alike."""
