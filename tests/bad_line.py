@@ -32,7 +32,7 @@ class BadLine:
     in_flight = window = 1
 
     def __init__(self, inner: Transport, *, in_order: bool = False) -> None:
-        self.disorder = 0.0
+        self.reorder_window = 0.0
         self.request: Spoil = unspoilt
         self.reply: Spoil = unspoilt
         self._inner = inner
@@ -69,7 +69,7 @@ class BadLine:
 
 def bad_lines(patch: pytest.MonkeyPatch, *, in_order: bool = False) -> list[BadLine]:
     """Returns where the lines will be over which `sim://` is reached from now on."""
-    from dobot_async import family
+    from dobot_async.arms import session
     from dobot_async.transports import open_transport
 
     made: list[BadLine] = []
@@ -78,5 +78,5 @@ def bad_lines(patch: pytest.MonkeyPatch, *, in_order: bool = False) -> list[BadL
         made.append(BadLine(await open_transport(url, arm=arm), in_order=in_order))
         return made[-1]
 
-    patch.setattr(family, "open_transport", opened)
+    patch.setattr(session, "open_transport", opened)
     return made

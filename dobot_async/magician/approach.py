@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 
-from dobot_async.executor import Entry
+from dobot_async._core.queue.executor import Entry
 from dobot_async.magician import commands as c
 from dobot_async.magician.reach import Destination, destination
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable
+from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -13,9 +13,12 @@ from typing import Any, Literal, Self, TypeVar
 
 import anyio
 
-from dobot_async.errors import ConnectFailed, DobotError
-from dobot_async.family import open_in_time, owned
-from dobot_async.link import Link
+from dobot_async._core.link.link import Link
+from dobot_async._core.link.round_trip import RoundTrip
+from dobot_async._core.util.arguments import check_duration
+from dobot_async._core.util.tasks import run_concurrently, run_shielded
+from dobot_async.arms.session import arm_session, check_options, open_in_time, run_owned
+from dobot_async.errors import ConnectFailed, DobotError, MotionStopped
 from dobot_async.magician import commands as c
 from dobot_async.magician import frame
 from dobot_async.magician.alarms import Alarm, decode
@@ -25,15 +28,13 @@ from dobot_async.magician.queue import MagicianQueue
 from dobot_async.magician.reach import check_reach as check_target
 from dobot_async.magician.verbs import Verbs
 from dobot_async.magician.wifi import WiFi
-from dobot_async.motion import undisturbed
-from dobot_async.roundtrip import RoundTrip
+from dobot_async.transports import Transport
 from dobot_async.wire import Command, Queueing
 
 __all__ = ["DeviceInfo", "Jog", "Magician"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-LEAVE_TIMEOUT = 2.0
 TEACH_INTERVAL = 0.05
 
 
@@ -62,18 +63,22 @@ class Jog(Enum):
 
 STILL = c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE)
 
-LEAVING: tuple[tuple[Command[Any, None], Any], ...] = (
-    (c.SET_QUEUED_CMD_FORCE_STOP_EXEC, None),
-    (c.SET_QUEUED_CMD_CLEAR, None),
-    (c.SET_JOG_CMD, STILL),
+TOOLS: tuple[tuple[Command[Any, None], Any], ...] = (
     (c.SET_END_EFFECTOR_LASER, c.EndEffectorLaser(is_ctrl_enabled=False, is_on=False)),
     (c.SET_E_MOTOR, c.EMotor(0, is_enabled=False, speed=0)),
     (c.SET_E_MOTOR, c.EMotor(1, is_enabled=False, speed=0)),
 )
-"""What is said to the arm at once when its block is left by an error: nothing moves or burns after it."""
+"""What is switched off, beside the stop, when the arm's block is left by an error: nothing burns or turns after it."""
 
+LEAVING: tuple[tuple[Command[Any, None], Any], ...] = (
+    (c.SET_QUEUED_CMD_FORCE_STOP_EXEC, None),
+    (c.SET_QUEUED_CMD_CLEAR, None),
+    (c.SET_JOG_CMD, STILL),
+    *TOOLS,
+)
+"""All that ends what the arm does, the stop first."""
 
-FENCES = (
+BARRIERS = (
     c.GET_END_EFFECTOR_PARAMS,
     c.GET_PTP_COMMON_PARAMS,
     c.GET_JOG_COMMON_PARAMS,
@@ -87,9 +92,7 @@ FENCES = (
     c.GET_HOME_PARAMS,
     c.GET_PTP_COORDINATE_PARAMS,
 )
-"""Cheap to answer, and seldom asked: which answers are still to come shows by whether these have come.
-
-So many, because one that is lost itself is of no use until its answer cannot come any more."""
+"""Cheap reads used as barriers: the answer to one proves that earlier requests will not be answered."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +110,7 @@ class DeviceInfo:
     version: str
 
 
-class Magician(Verbs[Awaitable[None]]):
+class Magician(Verbs[Coroutine[Any, Any, None]]):
     """A Dobot Magician; made by `connect`. Each verb returns when the arm has done it.
 
     A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
@@ -119,14 +122,24 @@ class Magician(Verbs[Awaitable[None]]):
         wifi: Which network the arm joins, and whether it is in it.
     """
 
-    def __init__(self, link: Link[frame.Frame], *, window: int, check_reach: bool) -> None:
+    def __init__(
+        self,
+        link: Link[frame.Frame],
+        *,
+        window: int,
+        check_reach: bool,
+        fresh: bool = False,
+        remember: bool = False,
+    ) -> None:
         self.link = link
         self.wifi = WiFi(link)
         self.kinematics = Kinematics()
         self._check_reach = check_reach
+        self._fresh = fresh
+        self._remember = remember
         self._executor = MagicianExecutor(link, window, self._check)
         self.queue = MagicianQueue(self._executor)
-        link.lost = lambda error: self.queue.fail(error)  # noqa: PLW0108 - a fleet gives the arm another queue
+        link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
 
     @classmethod
     @asynccontextmanager
@@ -166,41 +179,36 @@ class Magician(Verbs[Awaitable[None]]):
             ValueError: The URL or an argument is wrong.
             ConnectFailed: No arm answered; the message says what to check.
         """
-        if window < 1 or queue not in {"fresh", "keep"} or on_error not in {"stop", "leave"}:
-            raise ValueError('expected window >= 1, queue "fresh" or "keep", on_error "stop" or "leave"')
+        timeout = check_options(queue, on_error, timeout, reply_timeout)
+        if not window >= 1:
+            raise ValueError(f"window must be at least 1, not {window!r}")
 
         floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
-        round_trip = RoundTrip(floor, ceiling)
-        loop = asyncio.get_running_loop()
-        deadline = loop.time() + timeout
-        transport = await open_in_time(url, "magician", timeout)
-        link = Link(
-            transport,
-            frame.Parser(),
-            frame.request,
-            url=url,
-            filler=frame.FILLER,
-            fences=FENCES,
-            read_only=not control,
-            round_trip=round_trip,
-            reopen=partial(open_in_time, getattr(transport, "url", url), "magician", timeout) if reconnect else None,
-        )
-        arm = cls(link, window=min(window, transport.window), check_reach=check_reach)
-        try:
-            await arm._greet(deadline - loop.time(), fresh=control and queue == "fresh", remember=control and reconnect)
-        except BaseException:
-            await undisturbed(arm._close())
-            raise
+        reopen = partial(open_in_time, arm="magician", timeout=timeout)
 
-        try:
+        def build(transport: Transport, found: str) -> Magician:
+            link: Link[frame.Frame] = Link(
+                transport,
+                frame.Parser(),
+                frame.request,
+                url=url,
+                barriers=[frame.request(row, b"", queued=False) for row in BARRIERS],
+                filler=frame.FILLER,
+                read_only=not control,
+                round_trip=RoundTrip(floor, ceiling),
+                reopen=partial(reopen, found) if reconnect else None,
+            )
+            return cls(
+                link,
+                window=min(window, transport.window),
+                check_reach=check_reach,
+                fresh=control and queue == "fresh",
+                remember=control and reconnect,
+            )
+
+        async with arm_session(url, timeout, reopen, build, stop_on_error=control and on_error == "stop") as arm:
+            assert isinstance(arm, cls)
             yield arm
-        except BaseException:
-            if control and on_error == "stop":
-                await undisturbed(arm._leave())
-
-            raise
-        finally:
-            await undisturbed(arm._close())
 
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
         """Sends any row of the command table immediately, and returns the arm's answer.
@@ -245,12 +253,14 @@ class Magician(Verbs[Awaitable[None]]):
         """Clears the alarms; what the arm was doing when they came up does not go on. Manual 2.5.2."""
         await self.queue.update()  # without its alarm a motion that failed looks like one that is done
         await self.link.request(c.CLEAR_ALL_ALARMS_STATE, None, timeout=timeout)
-        self._executor.readings.alarms_cleared()
+        self._executor.status.alarms_cleared()
 
     async def recover(self) -> None:
-        """Clears the alarms, empties the queue and starts it: the arm is ready for new commands."""
-        await self.clear_alarms()
+        """Empty the queue, clear the alarms, and let the queue run: the arm is ready for new commands."""
+        await self.queue.update()  # without its alarm a motion that failed looks like one that is done
         await self.queue.clear()
+        await self.clear_alarms()
+        await self.queue.resume()
 
     async def get_input(self, address: int, *, timeout: float | None = None) -> bool:
         """Returns the level of a digital input (1 to 20). Manual 2.16.4."""
@@ -300,27 +310,43 @@ class Magician(Verbs[Awaitable[None]]):
         """Lets a paused arm go on. Manual 2.19.1."""
         await self.queue.resume()
 
-    async def stop(self) -> None:
-        """Stops the arm now, ahead of everything; pending Motions raise MotionStopped. Manual 2.19.3."""
-        await self.queue.stop()
+    async def stop(self, *, timeout: float = 5.0) -> None:
+        """Stop the arm now, ahead of everything; pending Motions raise MotionStopped. Manual 2.19.3.
+
+        Args:
+            timeout: Seconds to wait for the arm to acknowledge it; it is repeated after that, too, until the arm does.
+
+        Raises:
+            ReplyTimeout: The arm has not acknowledged it yet.
+            ConnectionLost: The link is gone.
+        """
+        await self.queue.stop(timeout=timeout)
 
     async def jog(self, direction: Jog, seconds: float) -> None:
-        """Jogs for a time, at the speed of the JOG parameters, then stops. Manual 2.10.4."""
-        if not (math.isfinite(seconds) and seconds >= 0):
-            raise ValueError(f"seconds must be finite and not negative, not {seconds!r}")
+        """Jog for a time, at the speed of the JOG parameters, then stop. Manual 2.10.4.
 
+        Args:
+            direction: Of the tool, of a joint, or along the rail.
+            seconds: How long, finite and not negative.
+        """
+        seconds = check_duration(seconds)
         async with self.jogging(direction):
             await anyio.sleep(seconds)
 
     @asynccontextmanager
     async def jogging(self, direction: Jog) -> AsyncIterator[None]:
-        """Jogs until the block ends, however it ends. Manual 2.10.4."""
+        """Jog until the block ends, however it ends; the stop is repeated until the arm has heard it. Manual 2.10.4.
+
+        Raises:
+            ReplyTimeout: The arm does not acknowledge that it is to begin, or that it is to stop.
+        """
         is_joint, key = direction.value
-        try:
+        async with self.link.cleanup.at_end(self._stop_jog, "the end of the jog"):
             await self.link.request(c.SET_JOG_CMD, c.JOGCmd(is_joint, key))
             yield
-        finally:
-            await undisturbed(self.link.request(c.SET_JOG_CMD, STILL, urgent=True))
+
+    async def _stop_jog(self) -> None:
+        await self.link.request(c.SET_JOG_CMD, STILL, timeout=math.inf, urgent=True)
 
     async def taught_points(
         self, mode: c.HHTTrigMode = c.HHTTrigMode.TRIGGERED_ON_KEY_RELEASED
@@ -340,48 +366,40 @@ class Magician(Verbs[Awaitable[None]]):
                 await anyio.sleep(TEACH_INTERVAL)
         finally:
             with suppress(DobotError):
-                await undisturbed(self.link.request(c.SET_HHT_TRIG_OUTPUT_ENABLED, value=False))
+                await run_shielded(self.link.request(c.SET_HHT_TRIG_OUTPUT_ENABLED, value=False))
 
-    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Awaitable[None]:
-        """Does a command and returns when it is done: a motion through the queue, anything else immediately."""
+    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, None]:
+        """Do a command and return when it is done: a motion through the queue, anything else immediately."""
         if command.queueing is Queueing.ALWAYS:
-            return owned(self.queue, command, value, timeout)
+            return run_owned(self.queue, self.link.cleanup, command, value, timeout)
 
         return self.link.request(command, value, timeout=timeout)
 
-    def _check(self, value: Any) -> None:
-        """Raises Unreachable for a target that the arm cannot reach, if it was asked to."""
-        if self._check_reach:
-            check_target(self.kinematics, value)
-
-    async def _greet(self, timeout: float, *, fresh: bool, remember: bool) -> None:
-        """Proves that an arm answers, with a read that tells its end effector, and readies its queue."""
+    async def greet(self, timeout: float) -> None:
+        """Prove that an arm answers, with a read that tells its end effector, and ready its queue; for `connect`."""
         try:
             async with asyncio.timeout(timeout):
                 bias = await self.link.request(c.GET_END_EFFECTOR_PARAMS, None, timeout=timeout)
                 self.kinematics = Kinematics(bias.x_bias, bias.y_bias, bias.z_bias)
-                if remember:
-                    await self._executor.readings.remember()
+                if self._remember:
+                    await self._executor.status.remember()
 
-                if fresh:
-                    await self._executor.reset()
-                    await self._executor.left_space()
+                if self._fresh:
+                    await self._executor.clear()
+                    await self._executor.space.read()
         except (DobotError, TimeoutError) as error:
             raise silent(self.link) from error
 
-    async def _leave(self) -> None:
-        """Stops the arm and everything on it, as far as the link still allows."""
-        with suppress(TimeoutError, DobotError):
-            async with asyncio.timeout(LEAVE_TIMEOUT):
-                requests = (self.link.request(command, value, urgent=True) for command, value in LEAVING)
-                await asyncio.gather(*requests, return_exceptions=True)
-                # Who found out meanwhile what had become of a command may have queued a WAIT for its index.
-                await self.queue.aclose()
-                await self.link.request(c.SET_QUEUED_CMD_CLEAR, None, urgent=True)
+    async def leave(self) -> None:
+        """Stop the arm and everything on it, until it has heard that; for `connect`."""
+        stop = self.queue.begin_stop(MotionStopped("the connection's block was left by an error"))
+        await run_concurrently(*(self.link.request(row, value, timeout=math.inf, urgent=True) for row, value in TOOLS))
+        await stop
 
-    async def _close(self) -> None:
-        await self.queue.aclose()
-        await self.link.aclose()
+    def _check(self, value: Any) -> None:
+        """Raise Unreachable for a target that the arm cannot reach, if it was asked to."""
+        if self._check_reach:
+            check_target(self.kinematics, value)
 
 
 def silent(link: Link[frame.Frame]) -> ConnectFailed:

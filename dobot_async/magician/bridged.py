@@ -8,14 +8,14 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from dobot_async.arms.session import open_in_time
 from dobot_async.bridged import ByKey, Kind, Reading
 from dobot_async.contract import Parser
 from dobot_async.errors import ProtocolError
-from dobot_async.family import open_in_time
 from dobot_async.magician import alarms
 from dobot_async.magician import commands as c
 from dobot_async.magician import frame as f
-from dobot_async.magician.arm import LEAVING
+from dobot_async.magician.arm import BARRIERS, LEAVING
 from dobot_async.magician.frame import Frame
 from dobot_async.transports import Transport
 from dobot_async.wire import Command, Number, Queueing, u64
@@ -106,7 +106,8 @@ class BridgedMagician(ByKey[Frame]):
     encode = staticmethod(f.request)
     proves_stop = True
     greeting = f.request(c.GET_END_EFFECTOR_PARAMS, b"", queued=False)
-    stopping = tuple(f.request(command, command.request.encode(value), queued=False) for command, value in LEAVING)
+    barriers = tuple(f.request(row, b"", queued=False) for row in BARRIERS)
+    stopping = tuple(f.request(row, row.request.encode(value), queued=False) for row, value in LEAVING)
     readings = {  # noqa: RUF012 - a table
         "pose": Reading(f.request(c.GET_POSE, b"", queued=False), 0.2, told_pose),
         "motion": Reading(MagicianWatch().question, 0.2, told_index),

@@ -13,11 +13,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any, Generic, TypeVar
 
+from dobot_async._core.util.arguments import check_duration
 from dobot_async.magician import commands as c
 from dobot_async.wire import Command
 
 __all__ = ["Verbs"]
 
+LONGEST_WAIT = 4294967.295  # seconds; a u32 of milliseconds
 T = TypeVar("T")
 Q = TypeVar("Q")
 
@@ -179,13 +181,14 @@ class Verbs(Generic[T]):
 
     def set_speed(self, velocity: float, acceleration: float | None = None, *, timeout: float | None = None) -> T:
         """Sets the ratios (0 to 100 percent) of all PTP motions from here on. Manual 2.11.4."""
+        for name, ratio in {"velocity": velocity, "acceleration": acceleration}.items():
+            if ratio is not None and not ratio > 0:
+                raise ValueError(f"{name} must be above 0 percent, not {ratio!r}: an arm that has none never arrives")
+
         ratios = c.PTPCommonParams(velocity, velocity if acceleration is None else acceleration)
         return self.perform(c.SET_PTP_COMMON_PARAMS, ratios, timeout)
 
 
 def milliseconds(seconds: float) -> int:
-    """Whole milliseconds; raises ValueError where seconds are not finite or far too many."""
-    try:
-        return round(seconds * 1000)
-    except OverflowError:
-        raise ValueError(f"seconds must be in 0 to 4294967.295, not {seconds!r}") from None
+    """Return whole milliseconds; raise ValueError or TypeError for seconds that a WAIT cannot have."""
+    return round(1000 * check_duration(seconds, "seconds", LONGEST_WAIT))

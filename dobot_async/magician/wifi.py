@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv4Network
 from typing import Any
 
+from dobot_async._core.link.link import Link
+from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import ReplyTimeout
-from dobot_async.link import Link
 from dobot_async.magician import commands as c
 from dobot_async.wire import Command
 
@@ -130,8 +131,9 @@ class WiFi:
             ReplyTimeout: It was not in time; the message says what to check.
             ConnectionLost: The link is gone.
         """
+        seconds = check_timeout(timeout)
         try:
-            async with asyncio.timeout(timeout):
+            async with asyncio.timeout(seconds):
                 while True:
                     if await self.connected():
                         return

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from virtual import virtual
 
 from dobot_async import Magician, MotionStopped, PTPMode
-from dobot_async.executor import Entry
+from dobot_async._core.queue.executor import Entry
+from dobot_async._core.queue.poller import DENSE, POLL, SELDOM
 from dobot_async.magician import commands as c
 from dobot_async.magician.approach import Approach
-from dobot_async.motion import DENSE, POLL, SELDOM
 from dobot_async.simulator import simulate
 
 SHORT = 0.03  # seconds; of a motion that is over after a few looks the speed is not known

@@ -161,7 +161,7 @@ async def test_replies_after_a_pause_of_the_arm_answer_nobody_else(lines: list[B
 def doubled(lines: list[BadLine]) -> None:
     """The network delivers the next PTP command twice."""
     line = lines[0]
-    line.disorder = 0.005
+    line.reorder_window = 0.005
 
     def twice(data: bytes) -> list[tuple[float, bytes]]:
         if data[3] == c.SET_PTP_CMD.id:
@@ -212,7 +212,7 @@ async def test_a_vanished_arm_ends_everything_in_time(lines: list[BadLine]) -> N
             await arm.get_pose()
 
         assert loop.time() - before == pytest.approx(1.5, abs=0.01)
-        with pytest.raises(ConnectionError, match="no longer answers"):
+        with pytest.raises(MotionUnknown, match="no longer answers"):
             await motion
 
         assert loop.time() - before < 8
@@ -278,7 +278,7 @@ async def test_a_window_learns_by_the_way_how_much_room_there_is(wide_lines: lis
         simulate(speed=1e6, options=options, faults=faults) as sim,
         Magician.connect(sim.url, window=16) as arm,
     ):
-        arm.link.trace = note
+        arm.link.on_frame.add(note)
         async with arm.queue.batch() as batch:
             for step in range(320):
                 batch.move_to(200 + step / 8, 0, 40)
@@ -329,3 +329,35 @@ async def test_an_arm_that_stops_answering_while_it_is_greeted_fails_in_time(lin
             await opening
 
         assert loop.time() - before == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("lost", [1, 20])
+@virtual
+async def test_a_motion_behind_a_stop_that_ends_a_download_is_executed_and_not_stored(
+    wide_lines: list[BadLine], lost: int
+) -> None:
+    """What ends the download mode is lost several times: the stop is not over before the arm has heard it."""
+    async with simulate(speed=20, faults=Faults(latency=0.005)) as sim, Magician.connect(sim.url) as arm:
+
+        async def download() -> None:
+            async with arm.queue.download() as program:
+                for step in range(300):
+                    program.move_to(200 + step / 10, 0, 40)
+
+        places = count()
+
+        def request(data: bytes) -> list[tuple[float, bytes]]:
+            hit = any(frame.id == c.SET_QUEUED_CMD_STOP_DOWNLOAD.id for frame in Parser().feed(data))
+            return [] if hit and next(places) < lost else [(0, data)]
+
+        downloading = asyncio.create_task(download())
+        await asyncio.sleep(0.3)
+        wide_lines[0].request = request
+        await arm.stop()
+        assert sim.arm.program
+        stored = len(sim.arm.program.commands)
+        await arm.move_to(210, 0, 40)
+        assert targets(sim) == [210]
+        assert 0 < len(sim.arm.program.commands) == stored < 300
+        with pytest.raises(MotionStopped):
+            await downloading

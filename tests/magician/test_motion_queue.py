@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 from virtual import run_virtual
 
 from dobot_async import ArmAlarm, DobotError, Magician, MotionStopped, PTPMode, ReplyTimeout
+from dobot_async._core.queue.motion import Motion
+from dobot_async._core.queue.poller import POLL
 from dobot_async.magician import commands as c
-from dobot_async.motion import POLL, Motion
 from dobot_async.simulator import Faults, Simulation, simulate
 from dobot_async.simulator.work import DeviceOptions, Executed
 from dobot_async.wire import Command
@@ -118,12 +119,11 @@ class Program:
             await asyncio.wait([waiting])
 
     async def cancel_put(self, kinds: Sequence[Kind], seconds: float) -> None:
-        """Puts, and is cancelled, if it is not done before; on the wire only where there is room to count again."""
+        """Puts, and is cancelled, if it is not done before."""
         before = len(self.fates)
         putting = self.put(kinds, watched=True)
         await asyncio.sleep(seconds)
-        on_the_wire = bool(self.arm.queue._executor.under_way)
-        if not putting.done() and (self.roomy or not on_the_wire):
+        if not putting.done():
             putting.cancel()
             for fate in self.fates[before:]:
                 fate.cancelled = True
@@ -200,7 +200,7 @@ class Program:
             error = caught
 
         if fate.ended is not None:
-            assert fate.error is error
+            assert repr(fate.error) == repr(error)
 
         fate.error = error
         fate.ended = self.now if fate.ended is None else fate.ended

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import math
-from contextlib import AsyncExitStack
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
 
 import pytest
 from virtual import virtual
 
 from dobot_async import ConnectionLost, LinkState, Magician, MotionUnknown, ReplyTimeout
-from dobot_async.simulator import Simulation, simulate
+from dobot_async.simulator import DeviceOptions, Simulation, simulate
 
 
 def targets(sim: Simulation) -> list[tuple[float, float]]:
@@ -69,6 +70,65 @@ async def test_an_arm_that_was_switched_off_is_recognised() -> None:
         assert targets(sim)[-1] == (210, 0)
 
 
+CLOCK = 2**32 / 1000
+"""Seconds after which the arm's own clock, in ms, begins again at 0."""
+
+
+@asynccontextmanager
+async def on_for(uptime: float) -> AsyncIterator[Simulation]:
+    """An arm that has been on for so many seconds; nothing but its clock tells when it was switched off."""
+    loop = asyncio.get_running_loop()
+    options = DeviceOptions(initial_index=0, power_up_alarms=frozenset())
+    passed = 0.0
+    async with simulate(options=options, clock=lambda: loop.time() + passed) as sim:
+        passed = uptime
+        yield sim
+
+
+@pytest.mark.parametrize("before", [1.0, 5.0, 20.0])
+@virtual
+async def test_an_arm_whose_clock_begins_again_was_not_switched_off(before: float) -> None:
+    """It has been on for 49.7 days, all but a few seconds, when the link is opened."""
+    async with on_for(CLOCK - before) as sim, Magician.connect(sim.url, reconnect=True) as arm:
+        for step in range(4):
+            await asyncio.sleep(0.5)
+            motion = await arm.queue.move_to(200, 100 * (-1) ** step, 40)
+            sim.unplug()
+            await motion
+            await asyncio.sleep(before)
+
+        assert arm.link.outages == 4
+        assert sim.arm.device.uptime > CLOCK
+        assert targets(sim) == [(200, 100 * (-1) ** step) for step in range(4)]
+
+
+@virtual
+async def test_an_outage_of_a_few_ms_is_no_restart() -> None:
+    """The arm counts whole ms, and what is left over of them is no time that is missing."""
+    for step in range(15):
+        async with simulate() as sim, Magician.connect(sim.url, reconnect=True) as arm:
+            await asyncio.sleep(step / 1100)
+            motion = await arm.queue.move_to(200 + step, 0, 40)
+            sim.unplug()
+            await motion
+            assert targets(sim) == [(200 + step, 0)]
+
+
+@pytest.mark.parametrize("uptime", [0.0, 5.0, CLOCK / 4, CLOCK + 5.0])
+@virtual
+async def test_an_arm_that_was_switched_off_is_recognised_by_its_clock_alone(uptime: float) -> None:
+    async with on_for(uptime) as sim, Magician.connect(sim.url, reconnect=True) as arm:
+        await asyncio.sleep(2)
+        motion = await arm.queue.move_to(200, 100, 40)
+        sim.unplug()
+        sim.arm.power_cycle()
+        with pytest.raises(MotionUnknown, match="switched off and on"):
+            await motion.wait(10)
+
+        await arm.move_to(210, 0, 40)
+        assert targets(sim) == [(210, 0)]
+
+
 @virtual
 async def test_a_read_waits_for_the_link_no_longer_than_its_timeout() -> None:
     async with AsyncExitStack() as stack:
@@ -105,3 +165,29 @@ async def test_without_reconnect_a_broken_link_is_the_end() -> None:
                 await arm.get_pose()
 
         assert arm.link.state.value is LinkState.LOST
+
+
+@pytest.mark.parametrize("window", [1, 4])
+@virtual
+async def test_what_is_put_after_a_power_failure_that_nothing_else_tells_of_is_not_sent_twice(window: int) -> None:
+    """Its index went back: probes must not raise it to where it was, and take what was done for lost."""
+    async with simulate(speed=20) as sim, Magician.connect(sim.url, window=window) as arm:
+        for step in range(20):
+            await arm.queue.move_to(200 + step, 0, 40)
+
+        await arm.queue.join()
+        before = len(sim.arm.executed)
+        sim.arm.power_cycle()
+        with pytest.raises(MotionUnknown, match="switched off and on"):
+            await arm.queue.move_to(250, 0, 40)
+
+        await asyncio.sleep(2)
+        assert len(targets_of(sim, before)) <= 1
+        await arm.move_to(230, 0, 40)
+        assert targets_of(sim, before)[-1] == 230
+        assert len(set(targets_of(sim, before))) == len(targets_of(sim, before))
+
+
+def targets_of(sim: Simulation, first: int) -> list[float]:
+    """The x of the motions that the arm has executed, from one on."""
+    return [each.value.x for each in sim.arm.executed[first:] if each.name == "SetPTPCmd" and each.outcome == "done"]

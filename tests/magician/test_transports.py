@@ -30,9 +30,10 @@ from dobot_async import (
     PTPMode,
     SuctionCup,
 )
-from dobot_async.link import Link
+from dobot_async._core.link.link import Link
 from dobot_async.magician import commands as c
 from dobot_async.magician import frame
+from dobot_async.magician.arm import BARRIERS
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.transports import open_transport
 
@@ -448,7 +449,8 @@ async def test_a_flood_does_not_pile_up(kind: str, listen: str) -> None:
 
     async with peer() as url:
         parser = frame.Parser()
-        link = Link(await open_transport(url, arm="magician"), parser, frame.request, url=url)
+        barriers = [frame.request(row, b"", queued=False) for row in BARRIERS]
+        link = Link(await open_transport(url, arm="magician"), parser, frame.request, url=url, barriers=barriers)
         try:
             async with asyncio.timeout(IN_TIME):
                 while parser.junk_bytes + 38 * link.stats.received < (much if listen == "tcp" else much // 10):

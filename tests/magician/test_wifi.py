@@ -34,7 +34,7 @@ def written(arm: Magician) -> list[tuple[str, bytes]]:
         if outgoing and frame.write:
             commands.append((c.BY_KEY[frame.id, True].name, frame.params))
 
-    arm.link.trace = note
+    arm.link.on_frame.add(note)
     return commands
 
 
@@ -159,13 +159,13 @@ async def test_half_of_the_settings_do_not_take_effect() -> None:
             if frame.id == c.SET_WIFI_PASSWORD.id:
                 sim.faults.loss = 1.0
 
-        arm.link.trace = cut
+        arm.link.on_frame.add(cut)
         with pytest.raises(ReplyTimeout):
             await arm.wifi.configure("cell", "secret")
 
         assert sim.arm.state.get(c.SET_WIFI_CONFIG_MODE)
         sim.faults.loss = 0.0
-        arm.link.trace = None
+        arm.link.on_frame.remove(cut)
         await asyncio.sleep(60)
         assert not await arm.wifi.connected()
         await arm.wifi.configure("cell", "secret")
