@@ -72,7 +72,7 @@ SERVO_LOSS = CobotAlarm(
 
 
 def joint_alarms(codes: Sequence[int], joints: int) -> tuple[CobotAlarm, ...]:
-    """Returns the alarms of all joints; a code beyond the joints is the Atom's, which keeps no arm from moving."""
+    """Return the alarms of all joints; a code beyond the joints is the Atom's, which keeps no arm from moving."""
     return tuple(
         lookup(JOINT_CODES, code, place if place <= joints else None, blocks=place <= joints)
         for place, code in enumerate(codes, 1)
@@ -81,7 +81,7 @@ def joint_alarms(codes: Sequence[int], joints: int) -> tuple[CobotAlarm, ...]:
 
 
 def motion_alarm(code: int) -> tuple[CobotAlarm, ...]:
-    """Returns what was wrong with the last motion, if anything was."""
+    """Return what was wrong with the last motion, if anything was."""
     if not code:
         return ()
 

@@ -3,44 +3,51 @@
 from __future__ import annotations
 
 import asyncio
-import math
 import re
-from collections.abc import AsyncIterator, Awaitable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Coroutine
+from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal, Self, TypeVar, cast
-from urllib.parse import urlsplit
 
 import anyio
 
-from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTimeout
-from dobot_async.family import held, left, open_in_time, owned
-from dobot_async.hosted import HostedExecutor
-from dobot_async.link import Link
-from dobot_async.motion import undisturbed
+from dobot_async._core.link.link import Link
+from dobot_async._core.link.round_trip import RoundTrip
+from dobot_async._core.queue.host import HostExecutor
+from dobot_async._core.util.arguments import check_duration
+from dobot_async.arms.session import arm_session, check_options, run_owned
+from dobot_async.errors import ConnectionLost, MotionStopped, ProtocolError
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot import frame
 from dobot_async.mycobot.channel import Channel
-from dobot_async.mycobot.executor import CobotHand, Tolerance
+from dobot_async.mycobot.executor import CobotRunner, Tolerance
 from dobot_async.mycobot.models import AXES, DEFAULT, CobotModel, model_of
+from dobot_async.mycobot.opening import GAP, opened, silent, unlike, with_baud
 from dobot_async.mycobot.queue import CobotQueue
 from dobot_async.mycobot.readings import Readings
 from dobot_async.mycobot.verbs import SPEED, Verbs
-from dobot_async.roundtrip import RoundTrip
 from dobot_async.transports import Transport
-from dobot_async.transports.paced import Paced
 from dobot_async.wire import Command, Queueing
 
-__all__ = ["MyCobot"]
+__all__ = ["BARRIERS", "GAP", "MyCobot", "opened", "with_baud"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-GAP = 0.02  # seconds; an M5 that is given frames more closely loses them
-LEAVE_TIMEOUT = 2.0
 JOG = re.compile(rf"(?:j(?P<joint>[1-9])|(?P<axis>{'|'.join(sorted(AXES, key=len, reverse=True))}))(?P<way>[+-])")
 
+BARRIERS = (
+    c.IS_POWER_ON,
+    c.IS_CONTROLLER_CONNECTED,
+    c.IS_FREE_MODE,
+    c.GET_SPEED,
+    c.GET_REFERENCE_FRAME,
+    c.GET_MOVEMENT_TYPE,
+    c.GET_END_TYPE,
+)
+"""Cheap reads of all models, used as barriers: the answer to one proves that earlier requests will not be answered."""
 
-class MyCobot(Readings, Verbs[Awaitable[None]]):
+
+class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
     """An arm behind a link; made by `MyCobot.connect`. Each verb returns when the arm has done it.
 
     A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
@@ -50,15 +57,24 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
         queue: The queue of motions, with the same verbs. It is on this side, so it ends with the block.
     """
 
-    def __init__(self, link: Link[frame.Frame], *, model: CobotModel, acknowledges: bool, tolerance: Tolerance) -> None:
+    def __init__(
+        self,
+        link: Link[frame.Frame],
+        *,
+        model: CobotModel,
+        acknowledges: bool,
+        tolerance: Tolerance,
+        fresh: bool = False,
+    ) -> None:
         self.link = link
         self._model = model
+        self._fresh = fresh
         self._channel = Channel(link, model, acknowledges=acknowledges)
-        self._hand = CobotHand(self._channel, tolerance)
-        self._executor = HostedExecutor(self._hand)
+        self._runner = CobotRunner(self._channel, tolerance)
+        self._executor = HostExecutor(self._runner, link.cleanup)
         self.queue = CobotQueue(self._executor, model)
-        link.lost = lambda error: self.queue.fail(error)  # noqa: PLW0108 - a fleet gives the arm another queue
-        super().__init__(self._channel, self._hand)
+        link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
+        super().__init__(self._channel, self._runner)
 
     @property
     def model(self) -> CobotModel:
@@ -82,7 +98,7 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
         tolerance: Tolerance = (2.0, 5.0),
         gap: float = GAP,
     ) -> AsyncIterator[Self]:
-        """Connects to an arm for the length of a block.
+        """Connect to an arm for the length of a block.
 
         It never clears errors, sets parameters, powers the arm on or moves it on its own.
 
@@ -108,29 +124,42 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
                 side: they were never sent.
         """
         arm_model = model_of(model)
-        if queue not in {"fresh", "keep"} or on_error not in {"stop", "leave"} or gap < 0 or min(tolerance) <= 0:
-            raise ValueError('expected queue "fresh" or "keep", on_error "stop" or "leave", gap >= 0, tolerances > 0')
+        timeout = check_options(queue, on_error, timeout, reply_timeout)
+        gap = check_duration(gap, "gap")
+        if len(tolerance) != 2 or not min(check_duration(each, "tolerance") for each in tolerance) > 0:
+            raise ValueError(f"tolerance must be degrees and mm, both above 0, not {tolerance!r}")
 
         floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
-        reopen = partial(opened, with_baud(url, arm_model.baud), model, timeout, gap)
-        deadline = asyncio.get_running_loop().time() + timeout
-        link = Link(
-            await reopen(),
-            frame.Parser(arm_model.known),
-            frame.request,
-            url=url,
-            fences=(c.IS_POWER_ON, c.IS_CONTROLLER_CONNECTED),
-            read_only=not control,
-            round_trip=RoundTrip(floor, ceiling),
-            reopen=reopen if reconnect else None,
+        reopen = partial(opened, model=model, timeout=timeout, gap=gap)
+
+        def connected(transport: Transport, found: str) -> Link[frame.Frame]:
+            return Link(
+                transport,
+                frame.Parser(arm_model.known),
+                frame.request,
+                url=url,
+                barriers=[frame.request(arm_model.row(row), b"", queued=False) for row in BARRIERS],
+                read_only=not control,
+                round_trip=RoundTrip(floor, ceiling),
+                reopen=partial(reopen, found) if reconnect else None,
+            )
+
+        build = partial(
+            cls,
+            model=arm_model,
+            acknowledges=arm_model.acknowledges if acknowledges is None else acknowledges,
+            tolerance=tolerance,
+            fresh=control and queue == "fresh",
         )
-        acknowledges = arm_model.acknowledges if acknowledges is None else acknowledges
-        arm = cls(link, model=arm_model, acknowledges=acknowledges, tolerance=tolerance)
-        greet = arm._greet(left(deadline, timeout), fresh=control and queue == "fresh")
-        leave = arm._leave if control and on_error == "stop" else None
-        async with held(greet, leave=leave, close=arm._close):
+        async with arm_session(
+            with_baud(url, arm_model.baud),
+            timeout,
+            reopen,
+            lambda transport, found: build(connected(transport, found)),
+            stop_on_error=control and on_error == "stop",
+        ) as arm:
             yield arm
-            unsent = arm._executor.unsent
+            unsent = arm.queue.unsent
 
         if unsent:
             raise MotionStopped(
@@ -139,7 +168,7 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
             )
 
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
-        """Sends any row of the command table immediately, and returns the arm's answer, None for a command.
+        """Send any row of the command table immediately, and return the arm's answer, None for a command.
 
         Args:
             command: A row of `dobot_async.mycobot.commands`.
@@ -162,68 +191,95 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
         return cast(R, None)
 
     async def clear_alarms(self, *, timeout: float | None = None) -> None:
-        """Clears what was wrong with the last motion; the motions that it ended do not go on."""
-        try:
-            await self.queue.update()
-        except DobotError as error:
-            self.queue.fail(error)
-
+        """Clear what was wrong with the last motion; the motions that it ended do not go on."""
+        await self.queue.update()
         await self._channel.tell(c.CLEAR_ERROR_INFORMATION, None, timeout=timeout)
 
     async def recover(self) -> None:
-        """Clears the alarms and powers the arm on: it is ready for new commands."""
+        """Empty the queue, clear the alarms and power the arm on: it is ready for new commands."""
         await self.queue.clear()
         await self.clear_alarms()
         await self.power_on()
 
     async def pause(self) -> None:
-        """Lets the arm wait where it is, in the middle of a motion."""
+        """Let the arm wait where it is, in the middle of a motion."""
         await self.queue.pause()
 
     async def resume(self) -> None:
-        """Lets a paused arm go on."""
+        """Let a paused arm go on."""
         await self.queue.resume()
 
-    async def stop(self) -> None:
-        """Stops the arm now, ahead of everything; pending Motions raise MotionStopped."""
-        await self.queue.stop()
+    async def stop(self, *, timeout: float = 5.0) -> None:
+        """Stop the arm now, ahead of everything; pending Motions raise MotionStopped.
+
+        Args:
+            timeout: Seconds to wait until the arm says that it stands; it is told again after that, too, until it does.
+
+        Raises:
+            ReplyTimeout: The arm has not said so yet.
+            MotionUnknown: It says that it still moves, 2 s after it was told.
+            ConnectionLost: The link is gone.
+        """
+        await self.queue.stop(timeout=timeout)
 
     async def jog(self, direction: str, seconds: float, *, speed: int = SPEED) -> None:
-        """Jogs for a time, then stops.
+        """Jog for a time, then stop.
 
         Args:
             direction: j1+ j1- ... for a joint, x+ x- y+ y- z+ z- rx+ rx- ry+ ry- rz+ rz- for the tool.
-            seconds: How long.
+            seconds: How long, finite and not negative.
             speed: Percent.
         """
-        if not (math.isfinite(seconds) and seconds >= 0):
-            raise ValueError(f"seconds must be finite and not negative, not {seconds!r}")
-
+        seconds = check_duration(seconds)
         async with self.jogging(direction, speed=speed):
             await anyio.sleep(seconds)
 
     @asynccontextmanager
     async def jogging(self, direction: str, *, speed: int = SPEED) -> AsyncIterator[None]:
-        """Jogs until the block ends, however it ends."""
+        """Jog until the block ends, however it ends; the stop is repeated until the arm says that it stands.
+
+        Args:
+            direction: As for `jog`.
+            speed: Percent.
+
+        Raises:
+            ReplyTimeout: The arm does not answer when it is to begin, or when it is to stop.
+        """
         command, value = self._jog(direction, speed)
         self.link.frame(self._model.row(command), value)
         self._model.check(command, value)
-        try:
+        async with self.link.cleanup.at_end(self._runner.stop, "the end of the jog"):
             await self._channel.tell(command, value)
             yield
-        finally:
-            await undisturbed(self._hand.halt())
 
     async def jog_stop(self) -> None:
-        """Stops a jog; it stops any other motion as well."""
+        """Stop a jog; it stops any other motion as well."""
         await self.stop()
 
-    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Awaitable[None]:
-        """Does a command and returns when it is done: a motion through the queue, anything else immediately."""
+    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, None]:
+        """Do a command and return when it is done: a motion through the queue, anything else immediately."""
         if command.queueing is Queueing.ALWAYS:
-            return owned(self.queue, command, value, timeout)
+            return run_owned(self.queue, self.link.cleanup, command, value, timeout)
 
         return self._channel.tell(command, value, timeout=timeout)
+
+    async def greet(self, timeout: float) -> None:
+        """Prove that an arm answers, and as its model does, and stop it if that was asked for; for `connect`."""
+        powered = None
+        try:
+            async with asyncio.timeout(timeout):
+                powered = await self._channel.ask(c.IS_POWER_ON, None, timeout=timeout)
+                if powered:
+                    await self._channel.ask(c.GET_ANGLES, None)
+
+                if self._fresh:
+                    await self._runner.stop()
+        except (TimeoutError, ProtocolError, ConnectionLost) as error:
+            raise (silent if powered is None else unlike)(self.link, self._model) from error
+
+    async def leave(self) -> None:
+        """Stop the arm, until it says that it stands; for `connect`."""
+        await self.queue.begin_stop(MotionStopped("the connection's block was left by an error"))
 
     def _jog(self, direction: str, speed: int) -> tuple[Command[Any, None], c.JogJoint | c.JogAxis]:
         """The command of a jog."""
@@ -238,63 +294,3 @@ class MyCobot(Readings, Verbs[Awaitable[None]]):
             return c.JOG_ANGLE, c.JogJoint(int(found["joint"]), way, speed)
 
         return c.JOG_COORD, c.JogAxis(AXES.index(found["axis"]) + 1, way, speed)
-
-    async def _greet(self, timeout: float, *, fresh: bool) -> None:
-        """Proves that an arm answers, and as its model does, and stops it if that was asked for."""
-        try:
-            async with asyncio.timeout(timeout):
-                powered = await self._channel.ask(c.IS_POWER_ON, None, timeout=timeout)
-        except (DobotError, TimeoutError) as error:
-            raise silent(self.link, self._model) from error
-
-        try:
-            if powered:
-                await self._channel.ask(c.GET_ANGLES, None)
-
-            if fresh:
-                await self._hand.halt()
-        except ReplyTimeout as error:
-            raise ConnectFailed(
-                f"an arm answers at {self.link.url}, but not as a {self._model.title} with {self._model.joints} joints "
-                f"does ({self.link.stats.junk_bytes} bytes fit none of its answers); is the model right?"
-            ) from error
-
-    async def _leave(self) -> None:
-        """Stops the arm, as far as the link still allows."""
-        with suppress(TimeoutError, DobotError):
-            async with asyncio.timeout(LEAVE_TIMEOUT):
-                await self._executor.halt()
-
-    async def _close(self) -> None:
-        await self.queue.aclose()
-        await self._executor.aclose()
-        await self.link.aclose()
-
-
-async def opened(url: str, model: str, timeout: float, gap: float) -> Transport:
-    """Opens the way to an arm; what goes out on it is paced."""
-    return Paced(await open_in_time(url, model, timeout), gap)
-
-
-def with_baud(url: str, baud: int) -> str:
-    """A serial URL with the model's baud rate, unless it has one of its own or the rate is the usual one."""
-    parts = urlsplit(url)
-    if parts.scheme != "serial" or "baud=" in parts.query or baud == 115200:
-        return url
-
-    return f"{url}{'&' if parts.query else '?'}baud={baud}"
-
-
-def silent(link: Link[frame.Frame], model: CobotModel) -> ConnectFailed:
-    """Why no arm answered, as far as what came instead tells."""
-    advice = (
-        "is the M5 in its base set by hand to the menu Transponder, and there to USB UART; is the arm switched on; and "
-        "is this its port?"
-    )
-    if link.stats.junk_bytes:
-        return ConnectFailed(
-            f"{link.url} sends {link.stats.junk_bytes} bytes that are no answer of a {model.title}; is the baud rate "
-            f"right ({model.baud} for this model), {advice}"
-        )
-
-    return ConnectFailed(f"no {model.title} answers at {link.url}; {advice}")

@@ -75,6 +75,9 @@ class CobotWatch:
 
 STOPS = frozenset({c.STOP, c.JOG_STOP})
 
+BARRIERS = (c.IS_POWER_ON, c.IS_CONTROLLER_CONNECTED, c.IS_FREE_MODE, c.GET_SPEED)
+"""Cheap reads used as barriers: the answer to one proves that earlier requests will not be answered."""
+
 
 class BridgedCobot(ByKey[Frame]):
     """See `dobot_async.bridged.Bridged`; one for each model."""
@@ -85,6 +88,7 @@ class BridgedCobot(ByKey[Frame]):
 
     def __init__(self, model: CobotModel) -> None:
         self.model = model.name
+        self.barriers = tuple(request(model, row) for row in BARRIERS if row in model.rows)
         self.greeting = request(model, c.IS_POWER_ON)
         self.stopping = (request(model, c.STOP),)
         self.denials = {"calibration": frozenset(model.rows[row].id for row in CALIBRATION if row in model.rows)}

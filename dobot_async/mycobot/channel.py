@@ -1,32 +1,38 @@
 """What is said to an arm of the myCobot family, and what it answers, as its model has it.
 
-Reads are answered. Commands are acknowledged by newer firmware only, so `tell` takes an acknowledgement where there is
-one; where there is none it reads back what was set, if that can be read, and else makes sure that the arm is there.
-Whether a command is acknowledged is learned once for each.
+    ask    a read             --> the answer
+    tell   a setting          --> acknowledged, or read back, or at least the arm is there
+    send   a frame, once      --> whether it was acknowledged
+
+Reads are answered. Commands are acknowledged by newer firmware only; whether one is, is learned once for each.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any, Generic, TypeVar
 
+from dobot_async._core.link.link import Link
+from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import CommandRejected, ProtocolError, ReplyTimeout
-from dobot_async.link import Link
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.frame import Frame
 from dobot_async.mycobot.models import CobotModel, lengths
 from dobot_async.wire import Command, Layout
 
-__all__ = ["Channel"]
+__all__ = ["SILENCE", "Channel"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-BUSY = 2.0  # seconds that a motion waits for its turn on the link
 UNSURE = 0.5  # seconds to wait for an acknowledgement of which nobody knows yet whether it comes
-SILENCE = 5.0  # seconds without any answer after which the arm counts as lost
+NEW = 0.3  # the same for the answer to a read that older firmware does not know
+SILENCE = 5.0  # seconds without any answer after which what the arm does cannot be seen any more
+LEAST = 0.1  # seconds for the last question of a call whose time is over
 UNSUPPORTED = 2  # calls in a row without an answer, from an arm that answers other reads
 
 
@@ -39,7 +45,7 @@ class Unechoed(Generic[R]):
         self._request = request
 
     def decode(self, data: bytes) -> R:
-        """Decodes an answer; refuses the request."""
+        """Decode an answer; refuse the request."""
         if data == self._request:
             raise ProtocolError("that is the request, sent back")
 
@@ -61,31 +67,65 @@ class Channel:
         self._acknowledged: dict[Command[Any, Any], bool] = {}
         self._answered: set[Command[Any, Any]] = set()
         self._unanswered: Counter[Command[Any, Any]] = Counter()
+        self._now = asyncio.get_running_loop().time
 
-    async def ask(self, command: Command[Q, R], value: Q, *, timeout: float | None = None, urgent: bool = False) -> R:
-        """Reads something; raises as `Link.request` does.
+    async def ask(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
+        """Read something; raise as `Link.request` does.
 
         An M5 may send the request back before the answer. Where both may look alike, the answer is taken that does not,
         and the other one only if there is none.
         """
         row = self.model.row(command)
         data = row.request.encode(value)
+        timeout = chosen(timeout, row.timeout)
         if data and len(data) in lengths(row.reply):
+            timeout /= 2
             with suppress(ReplyTimeout, ProtocolError):
-                other = replace(row, reply=Unechoed(row.reply, data))
-                return await self.link.request(other, value, timeout=timeout, urgent=urgent)
+                return await self.link.request(replace(row, reply=Unechoed(row.reply, data)), value, timeout=timeout)
 
-        return await self.link.request(row, value, timeout=timeout, urgent=urgent)
+        return await self.link.request(row, value, timeout=timeout)
 
-    async def ask_if_known(self, command: Command[None, R], timeout: float) -> R | None:
-        """Reads something that older firmware does not know; None if the arm does not, which is found out."""
+    async def poll(self, command: Command[None, R]) -> R:
+        """Read something of an arm at work; see `through_outages`."""
+        return await self.through_outages(partial(self.ask, command, None, timeout=SILENCE))
+
+    async def through_outages(self, ask: Callable[[], Awaitable[R]]) -> R:
+        """Do what may be done again, and again after each outage of a link that is reopened.
+
+        Raises:
+            ReplyTimeout: The arm was silent on a link that was open all the time.
+        """
+        while True:
+            await self.link.opened()
+            outages = self.link.outages
+            try:
+                return await ask()
+            except ReplyTimeout:
+                if self._unbroken(outages):
+                    raise
+
+    async def ask_if_known(self, command: Command[None, R], timeout: float | None = None) -> R | None:
+        """Read something that older firmware does not know.
+
+        Args:
+            command: The row.
+            timeout: Seconds in which the arm has to answer anything; 5 by default.
+
+        Returns:
+            The answer; None if the arm does not know the row, which is found out.
+
+        Raises:
+            ReplyTimeout: The arm is silent.
+        """
         if not self.may_know(command):
             return None
 
+        timeout = chosen(timeout, SILENCE)
+        deadline = self._now() + timeout
         try:
-            answer = await self.ask(command, None, timeout=timeout)
+            answer = await self.ask(command, None, timeout=timeout if command in self._answered else min(NEW, timeout))
         except (ReplyTimeout, ProtocolError):
-            await self.ask(c.IS_MOVING, None, timeout=SILENCE)
+            await self.ask(c.IS_MOVING, None, timeout=self._left(deadline))
             self._unanswered[command] += 1
             return None
 
@@ -93,11 +133,16 @@ class Channel:
         return answer
 
     def may_know(self, command: Command[None, Any]) -> bool:
-        """Whether the arm answers a read, as far as is known yet."""
+        """Return whether the arm answers a read, as far as is known yet."""
         return command in self._answered or self._unanswered[command] < UNSUPPORTED
 
     async def tell(self, command: Command[Q, None], value: Q, *, timeout: float | None = None) -> None:
-        """Sets something that may be said more than once.
+        """Set something that may be said more than once.
+
+        Args:
+            command: The row.
+            value: Its parameters.
+            timeout: Seconds; the row's own by default.
 
         Raises:
             ValueError: The parameters do not fit, or the connection only reads.
@@ -106,7 +151,8 @@ class Channel:
         """
         row = self.model.row(command)
         frame = self.link.frame(row, value)
-        timeout = row.timeout if timeout is None else timeout
+        timeout = chosen(timeout, row.timeout)
+        deadline = self._now() + timeout
         if self._acknowledged.get(command, self._acknowledges):
             sure = self._acknowledged.get(command, False)
             try:
@@ -115,31 +161,59 @@ class Channel:
                 if sure:
                     raise
 
-                await self.ask(c.IS_MOVING, None, timeout=timeout)
+                await self.ask(c.IS_MOVING, None, timeout=self._left(deadline))
                 self._silent(command)
             else:
                 self._acknowledged[command] = True
                 return
         else:
-            await self.send(frame, command)
+            await self.send(frame, command, timeout)
 
-        await self._confirm(command, value, timeout, frame)
+        await self._confirm(command, value, deadline, frame)
 
-    async def send(self, frame: Frame, command: Command[Any, Any]) -> bool:
-        """Sends a frame once, and returns whether it was acknowledged; a late acknowledgement is swallowed."""
-        posted = await self.link.post(frame, lambda _: None, name=command.name, timeout=BUSY, tombstone=True)
-        if not self._acknowledged.get(command, self._acknowledges):
-            posted.forget()
-            return False
+    async def send(self, frame: Frame, command: Command[Any, Any], timeout: float = SILENCE) -> bool:
+        """Send a frame once.
 
-        try:
-            await posted.answer()
-        except ReplyTimeout:
+        Args:
+            frame: What is sent.
+            command: Its row.
+            timeout: Seconds for which the line may be busy, and the arm silent.
+
+        Returns:
+            Whether it was acknowledged. An acknowledgement that comes later than what was asked behind it is none.
+
+        Raises:
+            ReplyTimeout: The arm is silent on an open link, or the line takes no more bytes.
+        """
+        link = self.link
+        await link.opened()
+        outages = link.outages
+        async with link.slot(command.name, timeout):
+            try:
+                expected = self._acknowledged.get(command, self._acknowledges)
+                request = await link.send(frame, lambda _: None, timeout=timeout, expected=expected)
+                if not expected:
+                    return False
+
+                if await link.settle(request, timeout):
+                    self._acknowledged[command] = True
+                    return True
+            except TimeoutError as error:
+                if self._unbroken(outages):
+                    raise ReplyTimeout(f"no answer to {command.name} from {link.url} within {timeout:.3g} s") from error
+
+        if self._unbroken(outages):
             self._silent(command)
-            return False
 
-        self._acknowledged[command] = True
-        return True
+        return False
+
+    def _unbroken(self, outages: int) -> bool:
+        """Whether the link has been open all the time since it had so many outages."""
+        return self.link.open and self.link.outages == outages
+
+    def _left(self, deadline: float) -> float:
+        """The seconds until a deadline, a few if it is over."""
+        return max(deadline - self._now(), LEAST)
 
     def _silent(self, command: Command[Any, Any]) -> None:
         """A command was not acknowledged; if none ever was, this firmware acknowledges nothing."""
@@ -147,21 +221,25 @@ class Channel:
         if not any(self._acknowledged.values()):
             self._acknowledges = False
 
-    async def _confirm(self, command: Command[Q, None], value: Q, timeout: float, frame: Frame) -> None:
-        """Makes sure that an arm which does not acknowledge was told: it is read back, or at least the arm is there."""
+    async def _confirm(self, command: Command[Q, None], value: Q, deadline: float, frame: Frame) -> None:
+        """Make sure that an arm which does not acknowledge was told: it is read back, or at least the arm is there."""
         read = c.CONFIRMED_BY.get(command)
         if read is None or not self.may_know(read):
-            await self.ask(c.IS_MOVING, None, timeout=timeout)
+            await self.ask(c.IS_MOVING, None, timeout=self._left(deadline))
             return
 
         wanted = self.model.row(read).reply
-        loop = asyncio.get_running_loop()
-        deadline = loop.time() + timeout
-        while (found := await self.ask_if_known(read, timeout)) is not None:
+        while (found := await self.ask_if_known(read, self._left(deadline))) is not None:
             if wanted.encode(found) == wanted.encode(value):
                 return
 
-            if loop.time() >= deadline:
+            if self._now() >= deadline:
                 raise CommandRejected(f"{command.name} was sent with {value}, and the arm says {found}")
 
-            await self.send(frame, command)
+            await self.send(frame, command, self._left(deadline))
+
+
+def chosen(timeout: float | None, otherwise: float) -> float:
+    """Return the seconds that were chosen, if any."""
+    found = check_timeout(timeout)
+    return otherwise if found is None else found

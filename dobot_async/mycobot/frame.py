@@ -41,7 +41,7 @@ class Frame(NamedTuple):
 
 
 def encode(frame: Frame) -> bytes:
-    """Returns a frame's bytes; raises ValueError if it is longer than the arm takes (28 bytes of parameters)."""
+    """Return a frame's bytes; raise ValueError if it is longer than the arm takes (28 bytes of parameters)."""
     length = MIN_LENGTH + len(frame.params)
     if length > MAX_LENGTH:
         raise ValueError(f"{len(frame.params)} bytes of parameters; a frame carries at most {MAX_LENGTH - MIN_LENGTH}")
@@ -50,7 +50,7 @@ def encode(frame: Frame) -> bytes:
 
 
 def request(command: Command[Any, Any], params: bytes, *, queued: bool) -> Frame:
-    """Returns the frame that asks the arm to do, or tell, what a row of the table says."""
+    """Return the frame that asks the arm to do, or tell, what a row of the table says."""
     if queued and command.queueing is Queueing.NEVER:
         raise ValueError(f"{command.name} cannot be queued")
 
@@ -58,7 +58,7 @@ def request(command: Command[Any, Any], params: bytes, *, queued: bool) -> Frame
 
 
 class Parser:
-    """Finds frames in a stream that may be cut anywhere and may hold anything.
+    """Find frames in a stream that may be cut anywhere and may hold anything.
 
     Args:
         known: The commands of a model.
@@ -80,12 +80,12 @@ class Parser:
         return len(self._buffer)
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Takes the next bytes of the stream, returns the frames that they complete."""
+        """Take the next bytes of the stream, return the frames that they complete."""
         self._buffer += data
         return self._scan(0)
 
     def resync(self) -> list[Frame]:
-        """Gives up the frame that is still incomplete, returns all whole frames that lie inside of it and behind it.
+        """Give up the frame that is still incomplete, return all whole frames that lie inside of it and behind it.
 
         For when the rest of it is overdue: its header was noise, or its tail is lost.
         """
@@ -95,12 +95,12 @@ class Parser:
         return self._scan(1, overdue=True)
 
     def reset(self) -> None:
-        """Forgets the frame that is still incomplete: another stream begins."""
+        """Forget the frame that is still incomplete: another stream begins."""
         self.junk_bytes += len(self._buffer)
         self._buffer.clear()
 
     def _scan(self, at: int, *, overdue: bool = False) -> list[Frame]:
-        """Takes all frames out of the buffer, beginning at an offset.
+        """Take all frames out of the buffer, beginning at an offset.
 
         Ends at the first incomplete candidate; if it is overdue, looks for whole frames behind it first.
         """

@@ -12,12 +12,11 @@ from dobot_async.wire import Command
 
 __all__ = ["GOALS", "Goals"]
 
-SILENCE = 5.0  # seconds without an answer after which the arm counts as lost
 STEPS = 4096 / 360  # of an encoder, in a degree
 
 
 class Goals:
-    """Makes the goals of one arm's motions; what is relative is told from where the arm stands now.
+    """Make the goals of one arm's motions; what is relative is told from where the arm stands now.
 
     Attributes:
         channel: The arm.
@@ -44,7 +43,7 @@ class Goals:
 
     async def joint_step(self, value: c.JointMove) -> Goal:
         """One joint, from where it is now."""
-        here = await self.channel.ask(c.GET_ANGLES, None, timeout=SILENCE)
+        here = await self.channel.poll(c.GET_ANGLES)
         return self.joints({value.joint - 1: here[value.joint - 1] + value.angle})
 
     def coords(self, expected: Mapping[int, float]) -> Goal:
@@ -64,7 +63,7 @@ class Goals:
 
     async def coord_step(self, value: c.CoordStep) -> Goal:
         """One coordinate, from where it is now."""
-        here = await self.channel.ask(c.GET_COORDS, None, timeout=SILENCE)
+        here = await self.channel.poll(c.GET_COORDS)
         return self.coords({value.axis - 1: here[value.axis - 1] + value.value})
 
     async def solution(self, value: c.SetSolutionAngle) -> Goal:

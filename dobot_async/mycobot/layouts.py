@@ -61,7 +61,7 @@ class Fixed:
         return self.scales[min(place, len(self.scales) - 1)]
 
     def encode(self, name: str, value: Any, sizes: Sizes) -> bytes:
-        """Returns the bytes of a field's value."""
+        """Return the bytes of a field's value."""
         if value is None and self.optional:
             return b""
 
@@ -73,7 +73,7 @@ class Fixed:
         return b"".join(self.pack(name, each, self.scale(place)) for place, each in enumerate(values))
 
     def pack(self, name: str, value: Any, scale: int) -> bytes:
-        """Returns the bytes of one number; raises ValueError or TypeError where it does not fit."""
+        """Return the bytes of one number; raise ValueError or TypeError where it does not fit."""
         if not hasattr(value, "__index__" if scale == 1 else "__float__"):
             raise TypeError(f"{name} must be a {'whole number' if scale == 1 else 'number'}, not {value!r}")
 
@@ -87,7 +87,7 @@ class Fixed:
             raise ValueError(f"{name} does not fit into its bytes on the wire: {value!r}") from None
 
     def decode(self, data: bytes, kind: Any) -> Any:
-        """Returns the value of a field's bytes."""
+        """Return the value of a field's bytes."""
         numbers = struct.unpack(f">{len(data) // self.width}{self.code}", data)
         values = tuple(
             number if self.scale(place) == 1 else number / self.scale(place) for place, number in enumerate(numbers)
@@ -117,18 +117,18 @@ class Packed(Generic[T]):
         self.parts: list[tuple[str, Fixed, Any]] = [(name, *fixed_of(name, hints[name])) for name in names]
 
     def sized(self, sizes: Sizes) -> Self:
-        """Returns the layout of a model that has so many joints and coordinates."""
+        """Return the layout of a model that has so many joints and coordinates."""
         return type(self)(self.kind, sizes)
 
     def encode(self, value: T) -> bytes:
-        """Packs a record."""
+        """Pack a record."""
         if not isinstance(value, self.kind):
             raise TypeError(f"expected {self.kind.__name__}, not {value!r}")
 
         return encode(self.parts, [getattr(value, name) for name, _, _ in self.parts], self.sizes)
 
     def decode(self, data: bytes) -> T:
-        """Unpacks a record; the bytes must be exactly its own."""
+        """Unpack a record; the bytes must be exactly its own."""
         return self.kind(*decode(self.parts, data, self.sizes))
 
     @property
@@ -146,15 +146,15 @@ class Value(Generic[T]):
         self.parts: list[tuple[str, Fixed, Any]] = [("value", *fixed_of("value", annotation))]
 
     def sized(self, sizes: Sizes) -> Self:
-        """Returns the layout of a model that has so many joints and coordinates."""
+        """Return the layout of a model that has so many joints and coordinates."""
         return type(self)(self.annotation, sizes)
 
     def encode(self, value: T) -> bytes:
-        """Packs a value."""
+        """Pack a value."""
         return encode(self.parts, [value], self.sizes)
 
     def decode(self, data: bytes) -> T:
-        """Unpacks a value; the bytes must be exactly its own."""
+        """Unpack a value; the bytes must be exactly its own."""
         [value] = decode(self.parts, data, self.sizes)
         return value  # type: ignore[no-any-return]
 
@@ -178,11 +178,11 @@ class Axis(Generic[T]):
         ]
 
     def encode(self, value: T) -> bytes:
-        """Packs a record."""
+        """Pack a record."""
         return self.layout(getattr(value, "axis", 1)).encode(value)
 
     def decode(self, data: bytes) -> T:
-        """Unpacks a record."""
+        """Unpack a record."""
         return self.layout(data[0] if data else 1).decode(data)
 
     def layout(self, axis: Any) -> Packed[T]:
@@ -196,11 +196,11 @@ class Whole:
     lengths = frozenset({1, 2})
 
     def encode(self, value: int) -> bytes:
-        """Packs a number, into one byte if it fits."""
+        """Pack a number, into one byte if it fits."""
         return value.to_bytes(1 if value < 256 else 2, "big")
 
     def decode(self, data: bytes) -> int:
-        """Unpacks a number."""
+        """Unpack a number."""
         if len(data) not in self.lengths:
             raise ProtocolError(f"expected 1 or 2 bytes of parameters, got {len(data)}")
 
@@ -214,11 +214,11 @@ class Octets:
         self.lengths = frozenset(range(low, high + 1))
 
     def encode(self, value: Sequence[int]) -> bytes:
-        """Packs the numbers."""
+        """Pack the numbers."""
         return bytes(value)
 
     def decode(self, data: bytes) -> tuple[int, ...]:
-        """Unpacks as many numbers as there are bytes."""
+        """Unpack as many numbers as there are bytes."""
         if len(data) not in self.lengths:
             raise ProtocolError(f"expected {min(self.lengths)} to {max(self.lengths)} bytes, got {len(data)}")
 
@@ -231,7 +231,7 @@ class Acknowledgement:
     lengths = frozenset({0, 1})
 
     def encode(self, value: None) -> bytes:
-        """Returns the byte that newer firmware answers with."""
+        """Return the byte that newer firmware answers with."""
         if value is not None:
             raise TypeError(f"an acknowledgement has no value, not {value!r}")
 

@@ -72,14 +72,14 @@ class CobotModel:
         return len(self.joint_limits)
 
     def row(self, command: Command[Q, R]) -> Command[Q, R]:
-        """Returns this model's own row; raises ValueError for one that it does not have."""
+        """Return this model's own row; raise ValueError for one that it does not have."""
         if command not in self.rows:
             raise ValueError(f"a {self.title} has no {command.name}")
 
         return cast("Command[Q, R]", self.rows[command])
 
     def check_joint(self, joint: int, angle: float) -> None:
-        """Raises ValueError for a joint that it does not have, or an angle beyond the joint's limits."""
+        """Raise ValueError for a joint that it does not have, or an angle beyond the joint's limits."""
         if not 1 <= joint <= self.joints:
             raise ValueError(f"a {self.title} has joints 1 to {self.joints}, not {joint}")
 
@@ -88,19 +88,19 @@ class CobotModel:
             raise ValueError(f"joint {joint} must be in {low:g} to {high:g} degrees, not {angle!r}")
 
     def check_coord(self, axis: int, value: float) -> None:
-        """Raises ValueError for an axis that it does not have, or a coordinate that it never reaches."""
+        """Raise ValueError for an axis that it does not have, or a coordinate that it never reaches."""
         self.check_axis(axis)
         low, high = self.reach[axis - 1]
         if not low <= value <= high:
             raise ValueError(f"{AXES[axis - 1]} must be in {low:g} to {high:g}, not {value!r}")
 
     def check_axis(self, axis: int) -> None:
-        """Raises ValueError for an axis that it does not have."""
+        """Raise ValueError for an axis that it does not have."""
         if not 1 <= axis <= len(self.reach):
             raise ValueError(f"a {self.title} has the axes 1 to {len(self.reach)}, not {axis}")
 
     def check(self, command: Command[Any, Any], value: Any) -> None:
-        """Raises ValueError for the parameters of a motion that this model cannot do, whatever its pose."""
+        """Raise ValueError for the parameters of a motion that this model cannot do, whatever its pose."""
         match value:
             case c.JointMove() if command is not c.JOG_INCREMENT:
                 self.check_joint(value.joint, value.angle)
@@ -230,7 +230,7 @@ MODELS: Mapping[str, CobotModel] = MappingProxyType(
 
 
 def model_of(name: str) -> CobotModel:
-    """Returns the model of a name; raises ValueError that lists them."""
+    """Return the model of a name; raise ValueError that lists them."""
     if name not in MODELS:
         raise ValueError(f"no model {name!r}; there are: {', '.join(MODELS)}")
 

@@ -173,7 +173,7 @@ class JointsAndCoords:
 
 @dataclass(frozen=True, slots=True)
 class JointMove:
-    """Moves one joint to an angle, or by it."""
+    """Move one joint to an angle, or by it."""
 
     joint: servo
     angle: angle
@@ -182,7 +182,7 @@ class JointMove:
 
 @dataclass(frozen=True, slots=True)
 class JointsMove:
-    """Moves all joints to angles."""
+    """Move all joints to angles."""
 
     angles: angles
     speed: percent = 50
@@ -190,7 +190,7 @@ class JointsMove:
 
 @dataclass(frozen=True, slots=True)
 class CoordMove:
-    """Moves the tool along one axis (1 to 6: x, y, z, rx, ry, rz) to a coordinate; the others stay as they are."""
+    """Move the tool along one axis (1 to 6: x, y, z, rx, ry, rz) to a coordinate; the others stay as they are."""
 
     axis: Annotated[int, Fixed("B", low=1, high=6)]
     value: Annotated[float, Fixed("h", (10,))]
@@ -199,7 +199,7 @@ class CoordMove:
 
 @dataclass(frozen=True, slots=True)
 class CoordStep:
-    """Moves the tool along one axis (1 to 6) by mm or degrees."""
+    """Move the tool along one axis (1 to 6) by mm or degrees."""
 
     axis: Annotated[int, Fixed("B", low=1, high=6)]
     value: Annotated[float, Fixed("h", (10,))]
@@ -208,7 +208,7 @@ class CoordStep:
 
 @dataclass(frozen=True, slots=True)
 class ToMove:
-    """Moves the tool to a point; without a mode the arm's movement type decides."""
+    """Move the tool to a point; without a mode the arm's movement type decides."""
 
     coords: coords
     speed: percent = 50
@@ -225,7 +225,7 @@ class InPosition:
 
 @dataclass(frozen=True, slots=True)
 class SetSolutionAngle:
-    """Turns the elbow of a 7-joint arm about the line from shoulder to wrist, and leaves the tool where it is."""
+    """Turn the elbow of a 7-joint arm about the line from shoulder to wrist, and leaves the tool where it is."""
 
     angle: angle
     speed: percent = 50
@@ -233,7 +233,7 @@ class SetSolutionAngle:
 
 @dataclass(frozen=True, slots=True)
 class JogJoint:
-    """Turns a joint until it is told to stop."""
+    """Turn a joint until it is told to stop."""
 
     joint: servo
     direction: Annotated[Direction, Fixed("B")]
@@ -242,7 +242,7 @@ class JogJoint:
 
 @dataclass(frozen=True, slots=True)
 class JogAxis:
-    """Moves the tool along an axis (1 to 6) until it is told to stop."""
+    """Move the tool along an axis (1 to 6) until it is told to stop."""
 
     axis: Annotated[int, Fixed("B", low=1, high=6)]
     direction: Annotated[Direction, Fixed("B")]
@@ -251,7 +251,7 @@ class JogAxis:
 
 @dataclass(frozen=True, slots=True)
 class JogRotation:
-    """Turns the tool about x, y or z (1 to 3) until it is told to stop."""
+    """Turn the tool about x, y or z (1 to 3) until it is told to stop."""
 
     axis: Annotated[int, Fixed("B", low=1, high=3)]
     direction: Annotated[Direction, Fixed("B")]
@@ -260,7 +260,7 @@ class JogRotation:
 
 @dataclass(frozen=True, slots=True)
 class SetEncoder:
-    """Moves one servo (7 and 8: the gripper) to a position of 0 to 4096."""
+    """Move one servo (7 and 8: the gripper) to a position of 0 to 4096."""
 
     joint: servo
     encoder: Annotated[int, Fixed("H", low=0, high=4096)]
@@ -269,7 +269,7 @@ class SetEncoder:
 
 @dataclass(frozen=True, slots=True)
 class SetEncoders:
-    """Moves all servos to positions of 0 to 4096."""
+    """Move all servos to positions of 0 to 4096."""
 
     encoders: Annotated[tuple[int, ...], Fixed("H", low=0, high=4096, count=Many.JOINTS)]
     speed: percent = 50
@@ -277,7 +277,7 @@ class SetEncoders:
 
 @dataclass(frozen=True, slots=True)
 class SetEncodersDrag:
-    """Moves all servos to positions of 0 to 4096, each at a speed in steps/s."""
+    """Move all servos to positions of 0 to 4096, each at a speed in steps/s."""
 
     encoders: Annotated[tuple[int, ...], Fixed("H", low=0, high=4096, count=Many.JOINTS)]
     speeds: u16s
@@ -293,7 +293,7 @@ class JointAngle:
 
 @dataclass(frozen=True, slots=True)
 class JointLimit:
-    """Sets the least or greatest angle that a joint may have."""
+    """Set the least or greatest angle that a joint may have."""
 
     joint: servo
     angle: limit
@@ -328,7 +328,7 @@ class ServoData:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Lets a servo go; damped, unless `undamped` is 1."""
+    """Let a servo go; damped, unless `undamped` is 1."""
 
     joint: servo
     undamped: Annotated[int | None, Fixed("B", low=0, high=1, optional=True)] = None
@@ -361,7 +361,7 @@ class PWMOutput:
 
 @dataclass(frozen=True, slots=True)
 class SetGripperState:
-    """Opens, closes or releases the gripper."""
+    """Open, closes or releases the gripper."""
 
     state: Annotated[GripperState, Fixed("B")]
     speed: percent = 50
@@ -370,7 +370,7 @@ class SetGripperState:
 
 @dataclass(frozen=True, slots=True)
 class SetGripperValue:
-    """Opens the gripper to 0 (closed) to 100 (open) percent."""
+    """Open the gripper to 0 (closed) to 100 (open) percent."""
 
     value: share
     speed: percent = 50

@@ -1,14 +1,15 @@
-"""The queue of a myCobot with the verbs on it, and its batches. It is on this side: see `hosted`."""
+"""The queue of a myCobot with the verbs on it, and its batches. It is on this side: see `_core.queue.host`."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
+from collections.abc import Coroutine
 from contextlib import AbstractAsyncContextManager
 from typing import Any, TypeVar
 
-from dobot_async.family import Collector, collected
-from dobot_async.hosted import HostedExecutor
-from dobot_async.motion import Motion, MotionQueue
+from dobot_async._core.queue.batch import BatchBuilder, batch
+from dobot_async._core.queue.host import HostExecutor, HostQueue
+from dobot_async._core.queue.motion import Motion
+from dobot_async._core.queue.queue import MotionQueue
 from dobot_async.mycobot.models import CobotModel
 from dobot_async.mycobot.verbs import Verbs
 from dobot_async.wire import Command
@@ -18,10 +19,10 @@ __all__ = ["CobotBatch", "CobotQueue"]
 Q = TypeVar("Q")
 
 
-class CobotQueue(MotionQueue, Verbs[Awaitable[Motion]]):
+class CobotQueue(HostQueue, Verbs[Coroutine[Any, Any, Motion]]):
     """What is put here the arm is given one after the other; each verb returns a Motion."""
 
-    def __init__(self, executor: HostedExecutor, model: CobotModel) -> None:
+    def __init__(self, executor: HostExecutor, model: CobotModel) -> None:
         super().__init__(executor)
         self._model = model
 
@@ -30,16 +31,23 @@ class CobotQueue(MotionQueue, Verbs[Awaitable[Motion]]):
         """What the arm is."""
         return self._model
 
-    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Awaitable[Motion]:
-        """Queues a command; see `put`."""
+    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, Motion]:
+        """Queue a command; see `put`."""
         return self.put(command, value, timeout=timeout)
 
     def batch(self, *, timeout: float | None = None) -> AbstractAsyncContextManager[CobotBatch]:
-        """Collects commands, and queues them with nothing between them when the block ends; an error sends none."""
-        return collected(self, CobotBatch(self, self._model), timeout)
+        """Collect commands, and queue them with nothing between them when the block ends; an error sends none.
+
+        Args:
+            timeout: Seconds to wait for room in the queue.
+
+        Raises:
+            DobotError: As `put`; what was accepted before that is pending.
+        """
+        return batch(self, CobotBatch(self, self._model), timeout)
 
 
-class CobotBatch(Collector, Verbs[Motion]):
+class CobotBatch(BatchBuilder, Verbs[Motion]):
     """Commands that are queued together; each verb returns its Motion, to be awaited after the batch's block."""
 
     def __init__(self, queue: MotionQueue, model: CobotModel) -> None:

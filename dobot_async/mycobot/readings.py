@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import ArmAlarm, CommandRejected, DobotError, ReplyTimeout
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.alarms import SERVO_LOSS, CobotAlarm
 from dobot_async.mycobot.channel import Channel
-from dobot_async.mycobot.executor import CobotHand
+from dobot_async.mycobot.executor import CobotRunner
 from dobot_async.mycobot.watch import cannot_read_servos
 from dobot_async.wire import Command
 
@@ -20,7 +21,6 @@ __all__ = ["CobotInfo", "CobotPose", "Readings"]
 Q = TypeVar("Q")
 POLL = 0.05
 POWER_TIME = 3.0
-UNSURE = 0.3  # seconds to wait for an answer that older firmware does not give
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,21 +57,21 @@ class CobotInfo:
 class Readings:
     """The part of `MyCobot` that is no motion. Every call takes `timeout`, in seconds, and raises as `request` does."""
 
-    def __init__(self, channel: Channel, hand: CobotHand) -> None:
+    def __init__(self, channel: Channel, runner: CobotRunner) -> None:
         self._channel = channel
-        self._hand = hand
+        self._runner = runner
 
     async def get_angles(self, *, timeout: float | None = None) -> tuple[float, ...]:
-        """Returns the joints, degrees; raises ArmAlarm if the arm cannot read its servos."""
+        """Return the joints, degrees; raise ArmAlarm if the arm cannot read its servos."""
         return believed(await self._channel.ask(c.GET_ANGLES, None, timeout=timeout))
 
     async def get_coords(self, *, timeout: float | None = None) -> c.Coords:
-        """Returns where the tool is, mm, and how it is turned, degrees, in the frames that are set."""
+        """Return where the tool is, mm, and how it is turned, degrees, in the frames that are set."""
         return c.Coords(*await self._channel.ask(c.GET_COORDS, None, timeout=timeout))
 
     async def get_pose(self, *, timeout: float | None = None) -> CobotPose:
-        """Returns tool and joints; of one moment if the firmware knows GetAnglesCoords, else one after the other."""
-        both = await self._channel.ask_if_known(c.GET_ANGLES_COORDS, UNSURE)
+        """Return tool and joints; of one moment if the firmware knows GetAnglesCoords, else one after the other."""
+        both = await self._channel.ask_if_known(c.GET_ANGLES_COORDS, timeout)
         if both is None:
             coords, joints = await self.get_coords(timeout=timeout), await self.get_angles(timeout=timeout)
         else:
@@ -79,49 +79,49 @@ class Readings:
 
         return CobotPose(coords.x, coords.y, coords.z, coords.rx, coords.ry, coords.rz, joints)
 
-    async def get_info(self) -> CobotInfo:
-        """Returns the model and the versions of its firmware."""
-        system: float | None = await self._channel.ask_if_known(c.GET_SYSTEM_VERSION, UNSURE)
-        basic: float | None = await self._channel.ask_if_known(c.GET_BASIC_VERSION, UNSURE)
+    async def get_info(self, *, timeout: float | None = None) -> CobotInfo:
+        """Return the model and the versions of its firmware."""
+        system: float | None = await self._channel.ask_if_known(c.GET_SYSTEM_VERSION, timeout)
+        basic: float | None = await self._channel.ask_if_known(c.GET_BASIC_VERSION, timeout)
         return CobotInfo(
             model=self._channel.model.title,
             system_version=system,
             basic_version=basic,
         )
 
-    async def get_alarms(self) -> tuple[CobotAlarm, ...]:
-        """Returns what keeps the arm from moving, and what was wrong with its last motion, with cause and remedy."""
-        return await self._hand.alarms()
+    async def get_alarms(self, *, timeout: float | None = None) -> tuple[CobotAlarm, ...]:
+        """Return what keeps the arm from moving, and what was wrong with its last motion, with cause and remedy."""
+        return await self._runner.alarms(timeout)
 
     async def is_moving(self, *, timeout: float | None = None) -> bool:
-        """Returns whether the arm says that it moves."""
+        """Return whether the arm says that it moves."""
         return await self._channel.ask(c.IS_MOVING, None, timeout=timeout)
 
     async def is_paused(self, *, timeout: float | None = None) -> bool:
-        """Returns whether the arm is paused."""
+        """Return whether the arm is paused."""
         return await self._channel.ask(c.IS_PAUSED, None, timeout=timeout)
 
     async def is_in_position(
         self, values: Sequence[float], *, coords: bool = False, timeout: float | None = None
     ) -> bool:
-        """Returns whether the arm says that it is at these angles, or coordinates. The vendor calls it unstable."""
+        """Return whether the arm says that it is at these angles, or coordinates. The vendor calls it unstable."""
         position = c.Position.COORDS if coords else c.Position.ANGLES
         return await self._channel.ask(c.IS_IN_POSITION, c.InPosition(tuple(values), position), timeout=timeout)
 
     async def is_powered(self, *, timeout: float | None = None) -> bool:
-        """Returns whether the Atom is powered."""
+        """Return whether the Atom is powered."""
         return await self._channel.ask(c.IS_POWER_ON, None, timeout=timeout)
 
     async def power_on(self, *, timeout: float | None = POWER_TIME) -> None:
-        """Powers the servos on, and returns when the arm says that they are."""
+        """Power the servos on, and return when the arm says that they are."""
         await self._switch(c.POWER_ON, None, lambda powered: powered, timeout)
 
     async def power_off(self, *, timeout: float | None = POWER_TIME) -> None:
-        """Powers the servos off: the arm falls. Returns when the arm says that they are."""
+        """Power the servos off: the arm falls. Returns when the arm says that they are."""
         await self._switch(c.POWER_OFF, None, lambda powered: not powered, timeout)
 
     async def release(self, joint: int | None = None, *, damping: bool = True, timeout: float | None = None) -> None:
-        """Lets one servo (from 1) go, or all: the arm falls, unless somebody holds it; damped, where the firmware can.
+        """Let one servo (from 1) go, or all: the arm falls, unless somebody holds it; damped, where the firmware can.
 
         Args:
             joint: Which one; None for all.
@@ -135,82 +135,82 @@ class Readings:
             await self._channel.tell(c.RELEASE_SERVO, c.Release(joint, undamped), timeout=timeout)
 
     async def focus(self, joint: int | None = None, *, timeout: float | None = None) -> None:
-        """Lets one servo (from 1) hold its place again, or all."""
+        """Let one servo (from 1) hold its place again, or all."""
         await self._channel.tell(c.FOCUS_SERVO, joint or 0, timeout=timeout)
 
     async def get_pin(self, pin: int, *, base: bool = False, timeout: float | None = None) -> bool:
-        """Returns the level of a pin of the Atom, at the tool, or of the M5 in the base."""
+        """Return the level of a pin of the Atom, at the tool, or of the M5 in the base."""
         row = c.GET_BASIC_INPUT if base else c.GET_DIGITAL_INPUT
         return bool((await self._channel.ask(row, pin, timeout=timeout)).level)
 
     async def get_gripper(self, *, kind: c.GripperType | None = None, timeout: float | None = None) -> int:
-        """Returns how far the gripper is open, 0 to 100 percent."""
+        """Return how far the gripper is open, 0 to 100 percent."""
         return await self._channel.ask(c.GET_GRIPPER_VALUE, kind, timeout=timeout)
 
     async def get_encoders(self, *, timeout: float | None = None) -> tuple[int, ...]:
-        """Returns the positions of the servos, 0 to 4096."""
+        """Return the positions of the servos, 0 to 4096."""
         return await self._channel.ask(c.GET_ENCODERS, None, timeout=timeout)
 
     async def get_speeds(self, *, timeout: float | None = None) -> tuple[int, ...]:
-        """Returns the speeds of the servos, steps/s."""
+        """Return the speeds of the servos, steps/s."""
         return await self._channel.ask(c.GET_SERVO_SPEEDS, None, timeout=timeout)
 
     async def get_voltages(self, *, timeout: float | None = None) -> tuple[float, ...]:
-        """Returns the voltages of the servos."""
+        """Return the voltages of the servos."""
         return await self._channel.ask(c.GET_SERVO_VOLTAGES, None, timeout=timeout)
 
     async def get_temperatures(self, *, timeout: float | None = None) -> tuple[int, ...]:
-        """Returns the temperatures of the servos, degrees Celsius."""
+        """Return the temperatures of the servos, degrees Celsius."""
         return await self._channel.ask(c.GET_SERVO_TEMPS, None, timeout=timeout)
 
     async def get_status(self, *, timeout: float | None = None) -> tuple[int, ...]:
-        """Returns a byte for each servo, 0 if all is well: bit 0 voltage, 1 sensor, 2 heat, 3 current, 5 overload."""
+        """Return a byte for each servo, 0 if all is well: bit 0 voltage, 1 sensor, 2 heat, 3 current, 5 overload."""
         return await self._channel.ask(c.GET_SERVO_STATUS, None, timeout=timeout)
 
     async def get_joint_limits(self, joint: int, *, timeout: float | None = None) -> tuple[float, float]:
-        """Returns the least and the greatest angle that the arm allows a joint (from 1)."""
+        """Return the least and the greatest angle that the arm allows a joint (from 1)."""
         low = await self._channel.ask(c.GET_JOINT_MIN_ANGLE, joint, timeout=timeout)
         high = await self._channel.ask(c.GET_JOINT_MAX_ANGLE, joint, timeout=timeout)
         return low.angle, high.angle
 
     async def set_joint_limits(self, joint: int, low: float, high: float, *, timeout: float | None = None) -> None:
-        """Sets the least and the greatest angle that the arm allows a joint (from 1); in tenths of a degree."""
+        """Set the least and the greatest angle that the arm allows a joint (from 1); in tenths of a degree."""
         await self._channel.tell(c.SET_JOINT_MIN, c.JointLimit(joint, low), timeout=timeout)
         await self._channel.tell(c.SET_JOINT_MAX, c.JointLimit(joint, high), timeout=timeout)
 
     async def get_tool(self, *, timeout: float | None = None) -> c.Coords:
-        """Returns where the tool's end is, seen from the flange."""
+        """Return where the tool's end is, seen from the flange."""
         return c.Coords(*await self._channel.ask(c.GET_TOOL_REFERENCE, None, timeout=timeout))
 
     async def set_tool(self, *coords: float, timeout: float | None = None) -> None:
-        """Says where the tool's end is, seen from the flange; it counts once `set_end_type(EndType.TOOL)` was said."""
+        """Say where the tool's end is, seen from the flange; it counts once `set_end_type(EndType.TOOL)` was said."""
         await self._channel.tell(c.SET_TOOL_REFERENCE, coords, timeout=timeout)
 
     async def get_world(self, *, timeout: float | None = None) -> c.Coords:
-        """Returns where the arm's base is in the world."""
+        """Return where the arm's base is in the world."""
         return c.Coords(*await self._channel.ask(c.GET_WORLD_REFERENCE, None, timeout=timeout))
 
     async def set_world(self, *coords: float, timeout: float | None = None) -> None:
-        """Says where the arm's base is in the world; it counts once the reference frame is WORLD."""
+        """Say where the arm's base is in the world; it counts once the reference frame is WORLD."""
         await self._channel.tell(c.SET_WORLD_REFERENCE, coords, timeout=timeout)
 
     async def set_reference_frame(self, frame: c.ReferenceFrame, *, timeout: float | None = None) -> None:
-        """Says in which frame coordinates are."""
+        """Say in which frame coordinates are."""
         await self._channel.tell(c.SET_REFERENCE_FRAME, frame, timeout=timeout)
 
     async def set_end_type(self, end: c.EndType, *, timeout: float | None = None) -> None:
-        """Says whether coordinates are the flange's or the tool's."""
+        """Say whether coordinates are the flange's or the tool's."""
         await self._channel.tell(c.SET_END_TYPE, end, timeout=timeout)
 
     async def set_movement_type(self, mode: c.MoveMode, *, timeout: float | None = None) -> None:
-        """Says how the arm moves to a point where the motion does not say it."""
+        """Say how the arm moves to a point where the motion does not say it."""
         await self._channel.tell(c.SET_MOVEMENT_TYPE, mode, timeout=timeout)
 
     async def _switch(
         self, command: Command[Q, None], value: Q, wanted: Callable[[Any], bool], timeout: float | None
     ) -> None:
-        """Says something, and returns when the arm's power is as wanted."""
-        answered = False
+        """Say something, and return when the arm's power is as wanted."""
+        timeout, answered = check_timeout(timeout), False
         try:
             async with asyncio.timeout(timeout):
                 await self._channel.tell(command, value, timeout=timeout)
@@ -231,7 +231,7 @@ class Readings:
 
 
 def believed(angles: tuple[float, ...]) -> tuple[float, ...]:
-    """The angles; raises ArmAlarm if they are those of an arm that cannot read its servos."""
+    """Return the angles; raise ArmAlarm if they are those of an arm that cannot read its servos."""
     if cannot_read_servos(angles):
         raise ArmAlarm(f"the arm raised alarms: {SERVO_LOSS}", [SERVO_LOSS])
 

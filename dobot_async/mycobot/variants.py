@@ -21,7 +21,7 @@ class ServoRegister:
     lengths = frozenset({3, 5})
 
     def encode(self, value: ServoData) -> bytes:
-        """Packs a value."""
+        """Pack a value."""
         if not isinstance(value, ServoData):
             raise TypeError(f"expected ServoData, not {value!r}")
 
@@ -35,7 +35,7 @@ class ServoRegister:
             raise ValueError(f"{value}: {error}") from None
 
     def decode(self, data: bytes) -> ServoData:
-        """Unpacks a value."""
+        """Unpack a value."""
         if len(data) not in self.lengths:
             raise ProtocolError(f"expected 3 or 5 bytes of parameters, got {len(data)}")
 
@@ -58,12 +58,12 @@ class PositionLayout:
         return frozenset(1 + each for some in found for each in some or ()) if all(found) else None
 
     def sized(self, sizes: Any) -> PositionLayout:
-        """Returns the layout of a model that has so many joints and coordinates."""
+        """Return the layout of a model that has so many joints and coordinates."""
         angles, coords = (layout.sized(sizes) for layout in self.layouts.values())
         return PositionLayout(angles, coords, first=self.first)
 
     def encode(self, value: InPosition) -> bytes:
-        """Packs a position."""
+        """Pack a position."""
         if not isinstance(value, InPosition):
             raise TypeError(f"expected InPosition, not {value!r}")
 
@@ -71,7 +71,7 @@ class PositionLayout:
         return kind + data if self.first else data + kind
 
     def decode(self, data: bytes) -> InPosition:
-        """Unpacks a position."""
+        """Unpack a position."""
         kind, values = (data[:1], data[1:]) if self.first else (data[-1:], data[:-1])
         try:
             position = Position(int.from_bytes(kind, "big"))

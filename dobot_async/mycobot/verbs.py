@@ -37,22 +37,22 @@ class Verbs(Generic[T]):
 
     @abstractmethod
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> T:
-        """Does, or queues, or collects a command."""
+        """Do, or queues, or collects a command."""
 
     def home(self, *, speed: int = 10, timeout: float | None = None) -> T:
-        """Moves all joints to 0 degrees; these arms need no calibration after power-up."""
+        """Move all joints to 0 degrees; these arms need no calibration after power-up."""
         return self.move_joints(*(0.0,) * self.model.joints, speed=speed, timeout=timeout)
 
     def move_joints(self, *angles: float, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Moves all joints, one angle for each, within the model's limits."""
+        """Move all joints, one angle for each, within the model's limits."""
         return self.perform(c.SEND_ANGLES, c.JointsMove(angles, speed), timeout)
 
     def move_joint(self, joint: int, angle: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Moves one joint (from 1) to an angle."""
+        """Move one joint (from 1) to an angle."""
         return self.perform(c.SEND_ANGLE, c.JointMove(joint, angle, speed), timeout)
 
     def step_joint(self, joint: int, degrees: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Moves one joint (from 1) by degrees."""
+        """Move one joint (from 1) by degrees."""
         return self.perform(c.JOG_INCREMENT, c.JointMove(joint, degrees, speed), timeout)
 
     def move_to(
@@ -65,7 +65,7 @@ class Verbs(Generic[T]):
         mode: c.MoveMode | None = c.MoveMode.ANGULAR,
         timeout: float | None = None,
     ) -> T:
-        """Moves the tool to a point.
+        """Move the tool to a point.
 
         Args:
             x: mm.
@@ -79,58 +79,58 @@ class Verbs(Generic[T]):
         return self.perform(c.SEND_COORDS, c.ToMove((x, y, z, *rotation), speed, mode), timeout)
 
     def move_coord(self, axis: Axis, value: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Moves the tool along one axis (x, y, z, rx, ry, rz) to a coordinate; the others stay as they are."""
+        """Move the tool along one axis (x, y, z, rx, ry, rz) to a coordinate; the others stay as they are."""
         return self.perform(c.SEND_COORD, c.CoordMove(axis_number(axis), value, speed), timeout)
 
     def step_coord(self, axis: Axis, value: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Moves the tool along one axis by mm or degrees; not on a myArm 300 or a myPalletizer."""
+        """Move the tool along one axis by mm or degrees; not on a myArm 300 or a myPalletizer."""
         return self.perform(c.JOG_INCREMENT_COORD, c.CoordStep(axis_number(axis), value, speed), timeout)
 
     def move_elbow(self, angle: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Turns the elbow of a myArm 300 about the line from shoulder to wrist, and leaves the tool where it is."""
+        """Turn the elbow of a myArm 300 about the line from shoulder to wrist, and leaves the tool where it is."""
         return self.perform(c.SET_SOLUTION_ANGLES, c.SetSolutionAngle(angle, speed), timeout)
 
     def move_encoders(self, *encoders: int, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Moves all servos to positions of 0 to 4096; 2048 is 0 degrees. Joint limits are not looked at."""
+        """Move all servos to positions of 0 to 4096; 2048 is 0 degrees. Joint limits are not looked at."""
         return self.perform(c.SET_ENCODERS, c.SetEncoders(encoders, speed), timeout)
 
     def wait(self, seconds: float, *, timeout: float | None = None) -> T:
-        """Holds the queue for a time."""
+        """Hold the queue for a time."""
         return self.perform(WAIT, seconds, timeout)
 
     def gripper(
         self, closed: bool, *, speed: int = SPEED, kind: c.GripperType | None = None, timeout: float | None = None
     ) -> T:
-        """Closes or opens the gripper."""
+        """Close or opens the gripper."""
         state = c.GripperState.CLOSED if closed else c.GripperState.OPEN
         return self.perform(c.SET_GRIPPER_STATE, c.SetGripperState(state, speed, kind), timeout)
 
     def gripper_to(
         self, value: int, *, speed: int = SPEED, kind: c.GripperType | None = None, timeout: float | None = None
     ) -> T:
-        """Opens the gripper to 0 (closed) to 100 (open) percent."""
+        """Open the gripper to 0 (closed) to 100 (open) percent."""
         return self.perform(c.SET_GRIPPER_VALUE, c.SetGripperValue(value, speed, kind), timeout)
 
     def color(self, red: int, green: int, blue: int, *, timeout: float | None = None) -> T:
-        """Sets the light of the Atom, 0 to 255 each."""
+        """Set the light of the Atom, 0 to 255 each."""
         return self.perform(c.SET_COLOR, c.RGB(red, green, blue), timeout)
 
     def configure_pin(self, pin: int, mode: c.PinMode, *, timeout: float | None = None) -> T:
-        """Says what a pin of the Atom, at the tool, is used for."""
+        """Say what a pin of the Atom, at the tool, is used for."""
         return self.perform(c.SET_PIN_MODE, c.PinModeSetting(pin, mode), timeout)
 
     def set_pin(self, pin: int, level: bool, *, base: bool = False, timeout: float | None = None) -> T:
-        """Sets a pin of the Atom, at the tool, or of the M5 in the base."""
+        """Set a pin of the Atom, at the tool, or of the M5 in the base."""
         row = c.SET_BASIC_OUTPUT if base else c.SET_DIGITAL_OUTPUT
         return self.perform(row, c.PinLevel(pin, int(level)), timeout)
 
     def set_pwm(self, pin: int, frequency: int, duty_cycle: int, *, timeout: float | None = None) -> T:
-        """Sets a PWM output of the Atom: Hz, and 0 to 255 parts of 256."""
+        """Set a PWM output of the Atom: Hz, and 0 to 255 parts of 256."""
         return self.perform(c.SET_PWM_OUTPUT, c.PWMOutput(pin, frequency, duty_cycle), timeout)
 
 
 def axis_number(axis: Axis) -> int:
-    """The number of an axis, from 1; raises ValueError for another word."""
+    """Return the number of an axis, from 1; raise ValueError for another word."""
     if axis not in AXES:
         raise ValueError(f"an axis is one of {', '.join(AXES)}, not {axis!r}")
 

@@ -62,15 +62,15 @@ class Goal:
     round: frozenset[int] = frozenset()
 
     def missed(self, here: Sequence[float]) -> float:
-        """Returns by how much the goal is missed, in the unit of the worst place; 0 within the tolerances."""
+        """Return by how much the goal is missed, in the unit of the worst place; 0 within the tolerances."""
         return max((gap for place, gap in self.gaps(here).items() if gap > self.tolerance(place)), default=0.0)
 
     def distance(self, here: Sequence[float]) -> float:
-        """Returns how far away the goal is, in the unit of the worst place, tolerances left aside."""
+        """Return how far away the goal is, in the unit of the worst place, tolerances left aside."""
         return max(self.gaps(here).values(), default=0.0)
 
     def gaps(self, here: Sequence[float]) -> dict[int, float]:
-        """Returns how far away it is in each place."""
+        """Return how far away it is in each place."""
         gaps = {place: abs(here[place] - wanted) for place, wanted in self.expected.items()}
         if self.rotation:
             gaps = {place: gap for place, gap in gaps.items() if place < 3}
@@ -111,7 +111,7 @@ class Watch:
     settled: bool = False
 
     def look(self, now: float, here: Sequence[float], *, moving: bool) -> Verdict:
-        """Takes what the arm told at a time; returns what is to be made of it."""
+        """Take what the arm told at a time; return what is to be made of it."""
         if not self.anchor:
             self.stand(now, here)
         elif max(abs(a - b) for a, b in zip(here, self.anchor, strict=True)) > self.goal.still:
@@ -146,7 +146,7 @@ class Watch:
         return MOVED if self.moved else LOOKS
 
     def expect(self, now: float, here: Sequence[float]) -> None:
-        """Notes when the arm will be there: now, if it is and has moved, else as its speed tells."""
+        """Note when the arm will be there: now, if it is and has moved, else as its speed tells."""
         distance = self.goal.distance(here)
         if self.moved and not self.goal.missed(here):
             self.ends_at = now
@@ -158,7 +158,7 @@ class Watch:
         self.distance = now, distance
 
     def stand(self, now: float, here: Sequence[float]) -> None:
-        """Takes where the arm is for where it may be standing."""
+        """Take where the arm is for where it may be standing."""
         self.anchor, self.still_since, self.looks = tuple(here), now, 0
 
     def hold(self, now: float) -> None:
@@ -175,7 +175,7 @@ def cannot_read_servos(angles: Sequence[float]) -> bool:
 
 
 def turned(one: Sequence[float], other: Sequence[float]) -> float:
-    """Returns the angle, in degrees, between two rotations, each given as degrees about x, then y, then z."""
+    """Return the angle, in degrees, between two rotations, each given as degrees about x, then y, then z."""
     a, b = matrix(one), matrix(other)
     trace = sum(a[row][column] * b[row][column] for row in range(3) for column in range(3))
     return math.degrees(math.acos(max(-1.0, min(1.0, (trace - 1) / 2))))
