@@ -4,57 +4,41 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
-from enum import Enum
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
 
 import anyio
 
-from dobot_async.errors import CommandRejected, ConnectFailed, DobotError
-from dobot_async.family import held, left, open_in_time, owned
-from dobot_async.link import Link
-from dobot_async.motion import undisturbed
-from dobot_async.roundtrip import RoundTrip
-from dobot_async.transports import Transport, hidden
+from dobot_async._core.link.link import Link
+from dobot_async._core.link.round_trip import RoundTrip
+from dobot_async._core.util.arguments import check_choice, check_duration, check_timeout
+from dobot_async._core.util.tasks import STAYING
+from dobot_async.arms.session import arm_session, check_options, run_owned
+from dobot_async.errors import CommandRejected, DobotError, MotionStopped, ReplyTimeout
+from dobot_async.transports import Transport
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.executor import UltraArmExecutor
-from dobot_async.ultraarm.frame import Frame, Parser, encode
+from dobot_async.ultraarm.frame import BARRIERS, Frame, Parser, encode
 from dobot_async.ultraarm.gcode import GCodeRun, Source, parse_gcode
+from dobot_async.ultraarm.jog import UltraArmJog
+from dobot_async.ultraarm.opening import opened, silent
 from dobot_async.ultraarm.queue import UltraArmQueue
-from dobot_async.ultraarm.verbs import SPEED, Pump, Verbs
+from dobot_async.ultraarm.verbs import SPEED, Pump, Verbs, check_speed
 from dobot_async.wire import Command, Queueing
 
 __all__ = ["UltraArm", "UltraArmJog"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-LEAVE_TIMEOUT = 2.0
 
 
-class UltraArmJog(Enum):
-    """A direction to jog in: of the tool, or of a joint. Manual 5, M13 and M14."""
-
-    X_PLUS = (False, 1, c.JogDirection.POSITIVE)
-    X_MINUS = (False, 1, c.JogDirection.NEGATIVE)
-    Y_PLUS = (False, 2, c.JogDirection.POSITIVE)
-    Y_MINUS = (False, 2, c.JogDirection.NEGATIVE)
-    Z_PLUS = (False, 3, c.JogDirection.POSITIVE)
-    Z_MINUS = (False, 3, c.JogDirection.NEGATIVE)
-    J1_PLUS = (True, 1, c.JogDirection.POSITIVE)
-    J1_MINUS = (True, 1, c.JogDirection.NEGATIVE)
-    J2_PLUS = (True, 2, c.JogDirection.POSITIVE)
-    J2_MINUS = (True, 2, c.JogDirection.NEGATIVE)
-    J3_PLUS = (True, 3, c.JogDirection.POSITIVE)
-    J3_MINUS = (True, 3, c.JogDirection.NEGATIVE)
+TOOLS: tuple[tuple[Command[Any, Any], Any], ...] = ((c.LASER_OFF, None), (c.SET_PWM, c.PWM(0)))
+"""What is switched off, beside the stop, when the arm's block is left by an error: nothing burns after it."""
 
 
-LEAVING: tuple[tuple[Command[Any, Any], Any], ...] = ((c.LASER_OFF, None), (c.SET_PWM, c.PWM(0)))
-"""What is said to the arm, beside the stop, when its block is left by an error: nothing burns after it."""
-
-
-class UltraArm(Verbs[Awaitable[None]]):
+class UltraArm(Verbs[Coroutine[Any, Any, None]]):
     """An ultraArm P340; made by `connect`. Each verb returns when the arm has done it.
 
     A command belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
@@ -74,13 +58,15 @@ class UltraArm(Verbs[Awaitable[None]]):
         depth: int,
         tolerance: float | None,
         on_stop: Literal["release", "finish"],
+        fresh: bool = False,
     ) -> None:
         self.link = link
         self.limits = limits
         self.pump = pump
+        self._fresh = fresh
         self._executor = UltraArmExecutor(link, limits.check, depth=depth, tolerance=tolerance, on_stop=on_stop)
         self.queue = UltraArmQueue(self._executor, pump)
-        link.lost = lambda error: self.queue.fail(error)  # noqa: PLW0108 - a fleet gives the arm another queue
+        link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
 
     @classmethod
     @asynccontextmanager
@@ -100,7 +86,7 @@ class UltraArm(Verbs[Awaitable[None]]):
         tolerance: float | None = 1.0,
         on_stop: Literal["release", "finish"] = "release",
     ) -> AsyncIterator[Self]:
-        """Connects to an arm for the length of a block.
+        """Connect to an arm for the length of a block.
 
         It never sets parameters or moves on its own.
 
@@ -129,33 +115,39 @@ class UltraArm(Verbs[Awaitable[None]]):
             ValueError: The URL or an argument is wrong.
             ConnectFailed: No arm answered; the message says what to check.
         """
-        choices = queue in {"fresh", "keep"} and on_error in {"stop", "leave"} and on_stop in {"release", "finish"}
-        if not (choices and pump in {"manual", "vendor"} and depth >= 1):
-            raise ValueError(
-                'expected queue "fresh" or "keep", on_error "stop" or "leave", on_stop "release" or "finish", pump '
-                '"manual" or "vendor", depth >= 1'
-            )
+        timeout = check_options(queue, on_error, timeout, reply_timeout)
+        check_choice("on_stop", on_stop, "release", "finish")
+        check_choice("pump", pump, "manual", "vendor")
+        if not hasattr(depth, "__index__") or depth < 1:
+            raise ValueError(f"depth must be a whole number, 1 or more, not {depth!r}")
+
+        tolerance = None if tolerance is None else check_duration(tolerance, "tolerance")
+        if tolerance == 0:
+            raise ValueError("tolerance must be above 0 (mm or degrees); None does not look")
 
         floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
-        deadline = asyncio.get_running_loop().time() + timeout
-        round_trip = RoundTrip(floor, ceiling)
-        link = Link(
-            await opened(url, timeout),
-            Parser(),
-            encode,
-            url=url,
-            read_only=not control,
-            round_trip=round_trip,
-            reopen=partial(opened, url, timeout) if reconnect else None,
-        )
-        arm = cls(link, limits=limits, pump=pump, depth=depth, tolerance=tolerance, on_stop=on_stop)
-        greet = arm._greet(left(deadline, timeout), fresh=queue == "fresh")
-        leave = arm._leave if control and on_error == "stop" else None
-        async with held(greet, leave=leave, close=arm._close):
+        reopen = partial(opened, timeout=timeout)
+
+        def build(transport: Transport, found: str) -> UltraArm:
+            link = Link(
+                transport,
+                Parser(),
+                encode,
+                url=url,
+                barriers=BARRIERS,
+                read_only=not control,
+                round_trip=RoundTrip(floor, ceiling),
+                reopen=partial(reopen, found) if reconnect else None,
+            )
+            fresh = queue == "fresh"
+            return cls(link, limits=limits, pump=pump, depth=depth, tolerance=tolerance, on_stop=on_stop, fresh=fresh)
+
+        async with arm_session(url, timeout, reopen, build, stop_on_error=control and on_error == "stop") as arm:
+            assert isinstance(arm, cls)
             yield arm
 
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
-        """Sends any row of the command table at once, and returns the arm's answer.
+        """Send any row of the command table at once, and return the arm's answer.
 
         What the arm makes wait in its queue has been taken, and not done, when this returns: a `Receipt` says how many
         commands wait.
@@ -178,72 +170,91 @@ class UltraArm(Verbs[Awaitable[None]]):
         return await self._executor.ask(command, value, timeout=timeout)
 
     async def get_angles(self, *, timeout: float | None = None) -> c.UltraArmAngles:
-        """Returns the joints, degrees. Manual 5, M12."""
+        """Return the joints, degrees. Manual 5, M12."""
         return await self._executor.ask(c.GET_ANGLES, None, timeout=timeout)
 
     async def get_coords(self, *, timeout: float | None = None) -> c.UltraArmCoords:
-        """Returns where the tool is, mm, and the fourth joint, degrees. Manual 5, M114."""
+        """Return where the tool is, mm, and the fourth joint, degrees. Manual 5, M114."""
         return await self._executor.ask(c.GET_COORDS, None, timeout=timeout)
 
     async def get_endstops(self, *, timeout: float | None = None) -> c.Endstops:
-        """Returns the home switches. Manual 5, M119."""
+        """Return the home switches. Manual 5, M119."""
         return await self._executor.ask(c.GET_ENDSTOPS, None, timeout=timeout)
 
     async def get_queue_size(self, *, timeout: float | None = None) -> int:
-        """Returns how many commands wait in the arm's queue."""
+        """Return how many commands wait in the arm's queue."""
         return (await self._executor.ask(c.GET_QUEUE_SIZE, None, timeout=timeout)).queue_size
 
     async def is_moving(self, *, timeout: float | None = None) -> bool:
-        """Returns whether the arm moves."""
+        """Return whether the arm moves."""
         return not (await self._executor.ask(c.GET_STATUS, None, timeout=timeout)).at_rest
 
     async def get_version(self, *, timeout: float | None = None) -> str:
-        """Returns the firmware's version, "1.2"; CommandRejected from firmware that does not tell it."""
+        """Return the firmware's version, "1.2"; CommandRejected from firmware that does not tell it."""
         version = await self._executor.ask(c.GET_SYSTEM_VERSION, None, timeout=timeout)
         return f"{version:g}"
 
-    async def stop(self) -> None:
-        """Stops the arm, ahead of everything; pending Motions raise MotionStopped. See `on_stop` of `connect`.
+    async def stop(self, *, timeout: float = STAYING) -> None:
+        """Stop the arm, ahead of everything; pending Motions raise MotionStopped. See `on_stop` of `connect`.
+
+        Args:
+            timeout: Seconds to wait until the arm is seen to stand; it is told again after that, too, until it does.
 
         Raises:
+            ReplyTimeout: It is not known to stand yet.
             CommandRejected: The arm goes on, although its motors were told to let go.
+            ConnectionLost: The link is gone.
         """
-        await self.queue.stop()
+        await self.queue.stop(timeout=timeout)
 
     async def release(self, *, timeout: float | None = None) -> None:
-        """Takes the power off the motors, now: the arm may sink, and forgets where it is. Manual 5, M17."""
+        """Take the power off the motors, now: the arm may sink, and forgets where it is. Manual 5, M17."""
         await self._executor.ask(c.RELEASE, None, timeout=timeout)
 
     async def jog(self, direction: UltraArmJog, seconds: float, *, speed: float = SPEED) -> None:
-        """Jogs for a time, then stops. Manual 5, M13 to M15."""
-        if not (math.isfinite(seconds) and seconds >= 0):
-            raise ValueError(f"seconds must be finite and not negative, not {seconds!r}")
+        """Jog for a time, then stop. Manual 5, M13 to M15.
 
+        Args:
+            direction: Of the tool, or of a joint.
+            seconds: How long, finite and not negative.
+            speed: 1 to 200.
+        """
+        seconds = check_duration(seconds)
         async with self.jogging(direction, speed=speed):
             await anyio.sleep(seconds)
 
     @asynccontextmanager
     async def jogging(self, direction: UltraArmJog, *, speed: float = SPEED) -> AsyncIterator[None]:
-        """Jogs until the block ends, however it ends. Manual 5, M13 to M15.
+        """Jog until the block ends, however it ends; the stop is repeated until that is seen. Manual 5, M13 to M15.
 
         Raises:
             CommandRejected: The motors have no power.
+            ReplyTimeout: The arm does not acknowledge that it is to begin, or is not seen to stand.
         """
         is_joint, axis, way = direction.value
         if self._executor.released:
             raise CommandRejected("the motors have no power: power_on(), then home()")
 
-        command, value = c.JOG_JOINT if is_joint else c.JOG_COORD, c.JogMove(axis, way, speed)
+        command, value = c.JOG_JOINT if is_joint else c.JOG_COORD, c.JogMove(axis, way, check_speed(speed))
         self.link.frame(command, value)  # what is wrong is said before anything is sent, a stop included
-        try:
+        async with self.link.cleanup.at_end(self._executor.end_jog, "the end of the jog"):
             await self._executor.ask(command, value)
             yield
-        finally:
-            await undisturbed(self.jog_stop())
 
-    async def jog_stop(self) -> None:
-        """Ends a jog; what is in the arm's queue goes on. Manual 5, M15."""
-        await self._executor.ask(c.JOG_STOP, None, urgent=True)
+    async def jog_stop(self, *, timeout: float = STAYING) -> None:
+        """End a jog; what is in the arm's queue goes on. Manual 5, M15.
+
+        Args:
+            timeout: Seconds to wait until the arm is seen to stand; it is told again after that, too, until it does.
+        """
+        self.link.frame(c.JOG_STOP, None)
+        limit = check_timeout(timeout)
+        ending = self.link.cleanup.start(self._executor.end_jog(), "the end of the jog")
+        done, _ = await asyncio.wait([ending], timeout=limit)
+        if not done:
+            raise ReplyTimeout(f"the jog has not ended within {timeout:.3g} s; the arm is told again until it does")
+
+        ending.result()
 
     def run_gcode(
         self,
@@ -253,7 +264,7 @@ class UltraArm(Verbs[Awaitable[None]]):
         constant_speed: bool = False,
         progress: Callable[[int, int], None] | None = None,
     ) -> GCodeRun:
-        """Checks a G-code program as a whole, and returns what runs it when it is awaited or iterated over.
+        """Check a G-code program as a whole, and return what runs it when it is awaited or iterated over.
 
             await arm.run_gcode("part.gcode")
             async for line in arm.run_gcode(lines): ...
@@ -269,56 +280,36 @@ class UltraArm(Verbs[Awaitable[None]]):
             OSError: The file cannot be read.
         """
         steps = parse_gcode(source, self.limits)
-        return GCodeRun(self.queue, steps, send=not dry_run, constant_speed=constant_speed, progress=progress)
-
-    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Awaitable[None]:
-        """Does a command through the queue, and returns when it is done."""
-        return owned(self.queue, command, value, timeout)
-
-    async def _greet(self, timeout: float, *, fresh: bool) -> None:
-        """Proves that an arm answers."""
-        try:
-            async with asyncio.timeout(timeout):
-                await self._executor.greet(timeout, fresh=fresh)
-        except (DobotError, TimeoutError) as error:
-            raise silent(self.link) from error
-
-    async def _leave(self) -> None:
-        """Stops the arm and its laser, as far as the link still allows."""
-        with suppress(TimeoutError):
-            async with asyncio.timeout(LEAVE_TIMEOUT):
-                await self._darken()
-                with suppress(DobotError):
-                    await self._executor.halt()
-
-                await self._darken()  # what the stop has thrown away may have been this
-
-    async def _darken(self) -> None:
-        """Switches the laser off."""
-        requests = (self._executor.ask(command, value, urgent=True) for command, value in LEAVING)
-        await asyncio.gather(*requests, return_exceptions=True)
-
-    async def _close(self) -> None:
-        await self.queue.aclose()
-        await self.link.aclose()
-
-
-async def opened(url: str, timeout: float) -> Transport:
-    """Opens the transport in time, for one request at a time: nothing in an answer tells whose it is."""
-    transport = await open_in_time(url, "ultraarm", timeout)
-    if transport.disorder:
-        await transport.aclose()
-        raise ValueError(
-            f"{hidden(url)!r}: an ultraArm needs a link that neither doubles nor reorders, such as serial: or tcp:"
+        return GCodeRun(
+            self.queue,
+            self.link.cleanup,
+            steps,
+            send=not dry_run,
+            constant_speed=constant_speed,
+            progress=progress,
         )
 
-    transport.in_flight = transport.window = 1
-    return transport
+    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, None]:
+        """Do a command through the queue, and return when it is done."""
+        return run_owned(self.queue, self.link.cleanup, command, value, timeout)
 
+    async def greet(self, timeout: float) -> None:
+        """Prove that an arm answers; for `connect`."""
+        try:
+            await self._executor.greet(timeout, fresh=self._fresh)
+        except DobotError as error:
+            raise silent(self.link) from error
 
-def silent(link: Link[Frame]) -> ConnectFailed:
-    """Why no arm answered."""
-    return ConnectFailed(
-        f"no ultraArm answers at {link.url}; is the arm switched on, is this its port, does it run at 115200 baud, and "
-        "does its firmware know M120 (QUEUE SIZE), which the oldest does not?"
-    )
+    async def leave(self) -> None:
+        """Stop the arm and its laser, until it has heard that; for `connect`."""
+        stop = self.queue.begin_stop(MotionStopped("the connection's block was left by an error"))
+        results = await asyncio.gather(stop, self._darken(), return_exceptions=True)
+        await self._darken()  # what the stop has thrown away may have been this
+        for failure in filter(None, results):
+            raise failure
+
+    async def _darken(self) -> None:
+        """Switch the laser off, until the arm has heard it."""
+        for command, value in TOOLS:
+            with suppress(CommandRejected):  # an arm that does not know it has none
+                await self._executor.ask(command, value, timeout=math.inf, urgent=True)

@@ -17,7 +17,8 @@ from typing import Any, TypeVar
 
 from dobot_async.layouts import NOTHING
 from dobot_async.rows import Rows
-from dobot_async.ultraarm.layouts import RECEIPT, STATUS, Bracket, Numbers, Receipt, Relative, Words
+from dobot_async.ultraarm.answers import RECEIPT, STATUS, Bracket, Numbers, Receipt
+from dobot_async.ultraarm.layouts import Relative, Words
 from dobot_async.ultraarm.params import *
 from dobot_async.wire import Command, Layout, Queueing
 

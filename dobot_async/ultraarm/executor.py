@@ -1,61 +1,39 @@
 r"""How an ultraArm takes commands, each exactly once. docs/ultraarm.md says what that rests on.
 
-    push --> G0 ... \r M120 \r --ok, QUEUE SIZE--> taken
-                 |
-                 `--silence, or no ok from an arm that says it--> settle: QUEUE SIZE, then where the arm comes to rest
-                                                                  --> taken | not taken | MotionUnknown
-
-The arm has no command that ends a queued motion. M15 ends a jog, and with some firmware perhaps more; what it does not
-end within a moment is ended by M17, which takes the power off the motors.
+submit --> G0 ... \r M120 \r M114 \r --ok, QUEUE SIZE--> taken
+              |
+              `--lost, or no ok from an arm that says it--> reconcile: QUEUE SIZE, then where the arm comes to rest
+                                                            --> taken | not taken: sent again | MotionUnknown
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from itertools import islice
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeVar, cast
 
+from dobot_async._core.link.link import Link
+from dobot_async._core.queue.executor import Entry, Source, alarmed
+from dobot_async._core.util.hooks import Hooks
 from dobot_async.errors import CommandRejected, MotionUnknown, ProtocolError, ReplyTimeout
-from dobot_async.executor import Accepted, Entry
-from dobot_async.link import Link
 from dobot_async.ultraarm import commands as c
-from dobot_async.ultraarm.books import MODES, Books, Target, target_of
-from dobot_async.ultraarm.frame import Frame, errors
-from dobot_async.ultraarm.layouts import Answer, Receipt, Refusal, Status
-from dobot_async.ultraarm.sight import PACE, RESTS, SILENCE, Sight
+from dobot_async.ultraarm.answers import Receipt, Refusal, with_errors
+from dobot_async.ultraarm.arrival import ArrivalChecker, Missed
+from dobot_async.ultraarm.frame import Frame
+from dobot_async.ultraarm.ledger import MODES, QueueLedger, UnackedCommand, target_of
+from dobot_async.ultraarm.status import PACE, RESTS, SILENCE, StatusPoller
+from dobot_async.ultraarm.stopper import Stopper
 from dobot_async.wire import Command
 
-__all__ = ["Missed", "UltraArmExecutor"]
+__all__ = ["UltraArmExecutor"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-SETTLED = 0.2  # seconds of rest elsewhere than it was told to, after which an arm has missed its target
-GRAIN = 0.02  # mm and degrees; the arm tells hundredths
-BRAKING = 5  # looks at an arm that was told to stop
-GIVING_UP = 50  # looks at an arm without power, after which it counts as one that cannot be stopped
-
-
-@dataclass(frozen=True, slots=True)
-class Missed:
-    """The arm came to rest elsewhere than it was told to, or said that something is wrong."""
-
-    text: str
-
-    def __str__(self) -> str:
-        return self.text
+MOST_OPEN = 500  # commands of which it is not known whether the arm has done them
 
 
 class UltraArmExecutor:
-    """The arm's own queue, over a link.
-
-    Attributes:
-        released: Whether the motors have no power, as far as this program knows.
-        room: How many more commands may be given, as far as was counted down.
-    """
+    """The arm's own queue, over a link; see `Executor`."""
 
     def __init__(
         self,
@@ -66,62 +44,59 @@ class UltraArmExecutor:
         tolerance: float | None,
         on_stop: Literal["release", "finish"],
     ) -> None:
-        self.distress: Callable[[MotionUnknown], None] = lambda _: None
-        self.released = False
-        self.room = 0
+        self.cleanup = link.cleanup
+        self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
         self._link = link
         self._check = check
         self._depth = depth
-        self._tolerance = tolerance
-        self._on_stop = on_stop
-        self._books = Books()
-        self._under_way: list[Entry] = []
-        self._awaited: Answer[Any] = Answer(None)
-        self._accepted: Accepted = lambda _entry, _ticket: None
-        self._answers: dict[Command[Any, Any], Command[Any, Any]] = {}
-        self._sight = Sight(self.ask, self._books)
+        self._ledger = QueueLedger()
+        self._status = StatusPoller(self.read, self._ledger)
+        self._arrival = ArrivalChecker(self.read, self._ledger, self._status, tolerance)
+        self._stopper = Stopper(self._status, on_stop)
+        self._room = 0  # how many more commands may be given, as far as was counted down
         self._says_ok: bool | None = None
         self._draining = False
         self._mode_known = False
-        self._slipped = False
-        self._halts = 0
-        self._fault: Missed | None = None
         self._outages = 0
 
     @property
-    def under_way(self) -> Collection[Entry]:
-        """The command that was sent and of which nobody knows yet whether the arm took it."""
-        return self._under_way
-
-    async def connected(self) -> None:
-        """Returns when the link is open; after an outage only where a motion's end can still be looked at."""
-        await self._link.opened()
-        if self._outages != self._link.outages:
-            self._outages = self._link.outages
-            self._sight.size = None
-            self._mode_known = False
-            if self._books.open and (self._books.target is None or self._tolerance is None):
-                raise MotionUnknown("the link was lost, and nothing tells whether the arm was switched off meanwhile")
+    def released(self) -> bool:
+        """Whether the motors have no power, as far as this program knows."""
+        return self._stopper.released
 
     async def ask(self, command: Command[Q, R], value: Q, *, timeout: float | None = None, urgent: bool = False) -> R:
-        """Sends one command, and returns the arm's answer.
+        """Send one command, and return the arm's answer.
 
         Raises:
             CommandRejected: The arm answered with an error.
             DobotError: As `Link.request`.
         """
-        answer = await self._link.request(self._row(command), value, timeout=timeout, urgent=urgent)
+        if command.write:
+            self._forget_size()  # each may make the queue longer, answered or not
+
+        answer = await self._link.request(with_errors(command), value, timeout=timeout, urgent=urgent)
         if isinstance(answer, Refusal):
             raise CommandRejected(f"the arm refused {command.name}: {answer.text}")
 
         self._note(command)
         if isinstance(answer, Receipt):
-            self._sight.size = answer.queue_size
+            self._status.size = answer.queue_size
 
         return cast(R, answer)
 
+    async def read(self, command: Command[None, R], *, timeout: float = SILENCE, urgent: bool = False) -> R:
+        """Read something, through outages of a link that is reopened; raise ReplyTimeout if the arm is silent."""
+        while True:
+            await self._link.opened()
+            outages = self._link.outages
+            try:
+                return await self.ask(command, None, timeout=timeout, urgent=urgent)
+            except ReplyTimeout:
+                if self._link.open and self._link.outages == outages:
+                    raise
+
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
-        """Returns a checked and encoded command; raises CommandRejected for motions while the motors have no power."""
+        """Return a checked and encoded command; raise CommandRejected for motions while the motors have no power."""
         frame = self._link.frame(command, value, queued=True)
         self._check(value)
         if command.moves and self.released:
@@ -131,241 +106,212 @@ class UltraArmExecutor:
 
         return Entry(command, value, frame)
 
-    async def left_space(self) -> int:
-        """Returns how many more commands are to lie in the arm's queue; none while it runs out."""
-        status = await self._sight.look()
-        if self._draining and not (status.at_rest and status.queue_size == 0):
-            return 0
-
-        self._draining = False
-        self.room = max(0, self._depth - status.queue_size)
-        return self.room
-
-    async def push(self, entries: Iterator[Entry], accepted: Accepted) -> None:
-        """Gives commands to the arm one by one; returns early if it did not take one."""
-        self._accepted = accepted
-        halts = self._halts
-        await self.settle()
-        if not self._mode_known:
-            await self.ask(c.RELATIVE if self._books.relative else c.ABSOLUTE, None)
-
-        for entry in islice(entries, self.room):
-            if self._halts != halts:
-                return
-
-            self.room -= 1
-            if not await self._give(entry):
-                self.room = 0
-                return
-
-    async def settle(self) -> None:
-        """Finds out what became of the command under way."""
-        if self._under_way:
-            entry = self._under_way[0]
-            if not await self._resolve(entry):
-                self._accepted(entry, None)
+    async def submit(self, source: Source) -> None:
+        """Give commands to the arm one by one; see `Executor`."""
+        while source:
+            await self._reconcile(source)
+            await self._await_room()
+            await self._set_mode(source)
+            if source:
+                await self._submit_one(source)
 
     async def completed(self) -> int | None:
-        """Returns the ticket of the last command that is done."""
-        status = await self._sight.next()
-        if status.text and errors(status.text.encode()) and self._books.open:
-            self._fault = Missed(status.text)
+        """Return the ticket of the last command that is done."""
+        await self._check_outage()
+        status = await self._status.poll_paced()
+        self._arrival.note(status)
+        if self._ledger.unacked or not self._status.is_at_rest:
+            return self._ledger.done_by_size(status.queue_size)
 
-        if not self._sight.done:
-            return self._books.waiting(status.queue_size)
+        return self._ledger.done_by_size(0) if self._arrival.misses(status) else self._ledger.all_done()
 
-        return self._books.waiting(0) if self._misses_target(status) else self._books.all_done()
+    async def earliest_end(self, entry: Entry) -> float | None:  # noqa: ARG002 - the status is polled at its own pace
+        """Return None."""
+        return None
 
-    async def remaining(self, entry: Entry) -> None:
-        """Returns None: it looks at its own pace."""
+    async def alarms(self) -> Sequence[Missed]:
+        """Return what went wrong without an answer to tell of it."""
+        return [self._arrival.fault] if self._arrival.fault else []
 
-    async def faults(self) -> Sequence[Missed]:
-        """Returns what went wrong without an answer to tell of it."""
-        return [self._fault] if self._fault else []
+    async def is_at_target(self, entry: Entry) -> bool:
+        """Return whether the arm stands where an absolute motion leads."""
+        return await self._arrival.is_at(target_of(entry, relative=self._ledger.relative))
 
-    async def stands_at(self, entry: Entry) -> bool:
-        """Returns whether the arm stands where an absolute motion leads."""
-        target = target_of(entry, relative=self._books.relative)
-        if target is None or self._tolerance is None:
-            return False
+    async def stop(self) -> None:
+        """Stop the arm until it is seen to stand; raise CommandRejected if it demonstrably goes on."""
+        try:
+            await self._stopper.stop()
+        finally:
+            if self.released:
+                self._ledger.note(c.RELEASE)
 
-        return target.miss(await self.place(joints=target.joints)) <= self._tolerance
+    async def end_jog(self) -> None:
+        """End a jog, until that is seen; what is in the arm's queue goes on."""
+        await self._stopper.end_jog(lambda: bool(self._ledger.open or self._ledger.unacked))
 
-    async def place(self, *, joints: bool) -> c.UltraArmAngles | c.UltraArmCoords:
-        """Returns where the arm is."""
-        if joints:
-            return await self.ask(c.GET_ANGLES, None, timeout=SILENCE)
-
-        return await self.ask(c.GET_COORDS, None, timeout=SILENCE)
-
-    async def halt(self) -> None:
-        """Stops the arm: M15, and M17 where that is not enough and may be done."""
-        self._halts += 1
-        with suppress(CommandRejected):  # an error that comes late may be of another command; what follows shows it
-            await self.ask(c.JOG_STOP, None, timeout=SILENCE, urgent=True)
-
-        if await self._sight.comes_to_rest(BRAKING) or self._on_stop == "finish":
-            return
-
-        with suppress(CommandRejected):
-            await self.ask(c.RELEASE, None, timeout=SILENCE, urgent=True)
-
-        self.released = True
-        if not await self._sight.comes_to_rest(GIVING_UP):
-            raise CommandRejected(
-                f"the arm goes on, with {self._sight.size} more commands in its queue: its protocol has nothing that "
-                "ends them; switch it off"
-            )
-
-    async def reset(self) -> None:
-        """Waits, where a stop lets the arm finish, until it has; then it is ready for new commands."""
-        if self._slipped:
-            await self.halt()
-            self._slipped = False
-
-        while self._on_stop == "finish" and not await self._sight.comes_to_rest(GIVING_UP):
-            pass
-
-        self.room = 0
+    async def clear(self) -> None:
+        """Forget what the arm was given: what it still has of it is done before it is given more."""
+        self._room = 0
         self._draining = True
-        if self._books.unfinished_mode or any(entry.command is c.MOVE_BY for entry in self._under_way):
-            self._mode_known = self._books.relative = False
+        if self._ledger.forget():
+            self._mode_known = self._ledger.relative = False
 
-        self._under_way = []
-        self._books.forget()
-        self._fault = None
+        self._arrival.fault = None
 
     async def pause(self) -> None:
-        """Raises CommandRejected: the protocol has no pause."""
+        """Raise CommandRejected: the protocol has no pause."""
         raise CommandRejected("an ultraArm cannot pause: put commands later, or stop it")
 
     async def resume(self) -> None:
-        """Raises CommandRejected: the protocol has no pause."""
+        """Raise CommandRejected: the protocol has no pause."""
         await self.pause()
 
     async def greet(self, timeout: float, *, fresh: bool) -> None:
-        """Proves that an arm answers; with `fresh`, nothing is put until what it still has to do is done."""
-        receipt = await self.ask(c.GET_QUEUE_SIZE, None, timeout=timeout)
+        """Prove that an arm answers; with `fresh`, nothing is put until what it still has to do is done."""
+        await self.ask(c.GET_QUEUE_SIZE, None, timeout=timeout)
         self._draining = fresh
-        self._sight.size = receipt.queue_size
 
-    async def _give(self, entry: Entry) -> bool:
-        """Sends a command once; returns whether the arm took it."""
-        self._under_way = [entry]
-        reply: Any = Answer[Any](entry.command.reply)
-        self._awaited = reply
-        halts = self._halts
+    async def _check_outage(self) -> None:
+        """After an outage of the link, raise MotionUnknown where a motion's end cannot be looked at."""
+        await self._link.opened()
+        if self._outages == self._link.outages:
+            return
+
+        self._outages = self._link.outages
+        self._forget_size()
+        self._mode_known = False
+        if self._ledger.open and not self._arrival.can_tell(self._ledger.target):
+            raise MotionUnknown("the link was lost, and nothing tells whether the arm was switched off meanwhile")
+
+    async def _await_room(self) -> None:
+        """Return when the arm may be given more; raise ArmAlarm if something went wrong meanwhile."""
+        await self._check_outage()
+        while not self._room or len(self._ledger.open) >= MOST_OPEN:
+            status = await self._status.poll()
+            if not self._draining or (status.at_rest and not status.queue_size):
+                self._draining = False
+                self._room = max(0, self._depth - status.queue_size)
+
+            if len(self._ledger.open) >= MOST_OPEN:  # nothing tells how far such a series is, until the arm rests
+                self._room = 0
+
+            if not self._room and self._arrival.fault:
+                raise alarmed([self._arrival.fault])
+
+            if not self._room:
+                await asyncio.sleep(PACE)
+
+    async def _set_mode(self, source: Source) -> None:
+        """See to it that coordinates mean what they are taken for."""
+        if source and not self._mode_known:
+            try:
+                await self.ask(c.RELATIVE if self._ledger.relative else c.ABSOLUTE, None, timeout=SILENCE)
+            except CommandRejected:
+                source.take()  # it is refused with it
+                raise
+
+    async def _submit_one(self, source: Source) -> None:
+        """Send one command, and find out whether the arm took it."""
+        entry = source.take()
+        reply = with_errors(entry.command).reply
+
+        def ready() -> None:
+            self._ledger.unacked = self._ledger.unacked or UnackedCommand(entry, self._status.size)
+            self._status.begin()
+
+        self._room -= 1
         try:
-            answer = await self._link.request(replace(entry.command, reply=reply, repeatable=False), entry.value)
+            answer = await self._link.exchange(
+                entry.frame,
+                lambda frame: reply.decode(frame.params),
+                name=entry.command.name,
+                timeout=SILENCE,
+                repeatable=entry.command.repeatable,
+                ready=ready,
+            )
         except (ReplyTimeout, ProtocolError):  # what came instead was somebody else's
-            return await self._resolve(entry)
-        finally:
-            self._slipped = self._slipped or self._halts != halts  # it may have been sent behind the stop
+            if self._ledger.unacked:
+                await self._reconcile(source)
+                return
+
+            source.put_back([entry])
+            raise
 
         if isinstance(answer, Refusal):
-            self._under_way = []
+            self._ledger.unacked = None
             raise CommandRejected(f"the arm refused {entry.command.name}: {answer.text}")
 
         if not answer.text and self._says_ok:
-            return await self._resolve(entry)
+            await self._reconcile(source)
+        else:
+            self._says_ok = bool(answer.text)
+            self._enter(entry, answer.queue_size, source)
 
-        self._says_ok = bool(answer.text)
-        self._enter(entry, answer.queue_size)
-        return True
+    async def _reconcile(self, source: Source) -> None:
+        """Find out what became of the unacknowledged command: if the arm did not take it, it comes next again."""
+        unacked = self._ledger.unacked
+        if unacked is None:
+            return
 
-    async def _resolve(self, entry: Entry) -> bool:
-        """Finds out whether the arm took a command; enters it, or returns False.
+        try:
+            size = await self._size_if_taken(unacked)
+        except ReplyTimeout:
+            name = unacked.entry.command.name
+            raise MotionUnknown(f"the arm fell silent, and nothing tells whether it took {name}") from None
+
+        self._says_ok = None  # whether it says ok is to be learnt again
+        if size is None:
+            self._ledger.unacked, self._room = None, 0
+            source.put_back([unacked.entry])
+        else:
+            self._enter(unacked.entry, size, source)
+
+    async def _size_if_taken(self, unacked: UnackedCommand) -> int | None:
+        """Return how many commands wait if the arm took a command, None if it did not.
 
         What waits can only become less by itself: if it has become more, it was taken. What may be done twice is not
         taken then, as far as anybody needs to know. Else the arm is left to run out, and where it comes to rest tells.
+
+        Raises:
+            MotionUnknown: Nothing can tell.
+            ReplyTimeout: The arm is silent.
         """
-        before, name = self._sight.size, entry.command.name
-        try:
-            while True:
-                await self._link.opened()
-                status = await self._sight.look()
-                self._awaited.over = True  # asked behind it, answered before it
-                if before is not None and status.queue_size > before:
-                    return self._taken(entry, status.queue_size)
+        entry, name = unacked.entry, unacked.entry.command.name
+        while True:
+            await self._check_outage()
+            status = await self._status.poll()
+            if unacked.size is not None and status.queue_size > unacked.size:
+                return status.queue_size
 
-                if entry.command.repeatable:
-                    return self._not_taken()
+            if entry.command.repeatable:
+                return None
 
-                if self._sight.rests >= RESTS:
-                    break
+            if self._status.rests >= RESTS:
+                break
 
-                await asyncio.sleep(PACE)
+            await asyncio.sleep(PACE)
 
-            target = target_of(entry, relative=self._books.relative)
-            if target and self._tolerance is not None:
-                return self._taken(entry, 0) if await self._came_to(target) else self._not_taken()
-        except ReplyTimeout:
-            raise MotionUnknown(f"the arm fell silent, and nothing tells whether it took {name}") from None
+        target = target_of(entry, relative=self._ledger.relative)
+        if target and self._arrival.can_tell(target):
+            return 0 if await self._arrival.came_to(target) else None
 
         raise MotionUnknown(f"the arm did not acknowledge {name}, and nothing tells whether it took it")
 
-    async def _came_to(self, target: Target) -> bool:
-        """Whether the arm, at rest, has come to a target, and not only stands near it, where it stood before.
+    def _forget_size(self) -> None:
+        """Nothing tells any more by how much the arm's queue has grown."""
+        self._status.size = None
+        if self._ledger.unacked:
+            self._ledger.unacked.size = None
 
-        If in doubt it has not: to be told once more where it stands moves an arm by no more than the tolerance.
-        """
-        here, before = await self.place(joints=target.joints), self._books.target
-        miss = target.miss(here)
-        nearer = before is not None and before.joints == target.joints and miss < before.miss(here)
-        return miss <= GRAIN or (nearer and self._tolerance is not None and miss <= self._tolerance)
-
-    def _row(self, command: Command[Q, Any]) -> Command[Q, Any]:
-        """The row with answers that may be errors."""
-        row = self._answers.get(command)
-        if row is None:
-            row = self._answers[command] = replace(command, reply=Answer(command.reply))
-
-        return row
-
-    def _taken(self, entry: Entry, size: int) -> bool:
-        """The arm took a command, although it did not say so."""
-        self._says_ok = None
-        self._enter(entry, size)
-        return True
-
-    def _not_taken(self) -> bool:
-        """The arm did not take the command under way; whether it says ok is to be learnt again."""
-        self._says_ok = None
-        self._under_way = []
-        return False
-
-    def _enter(self, entry: Entry, size: int) -> None:
-        """The arm took a command."""
-        self._under_way = []
-        self._sight.size = size
-        self._sight.given()
+    def _enter(self, entry: Entry, size: int, source: Source) -> None:
+        """Enter a command that the arm has taken."""
+        self._status.size = size
+        self._status.begin()
         self._note(entry.command)
-        self._accepted(entry, self._books.take(entry))
+        source.accepted(entry, self._ledger.enter(entry))
 
     def _note(self, command: Command[Any, Any]) -> None:
-        """The arm has taken a command; notes what that means."""
-        self._books.note(command)
+        """Note what a command that the arm has taken means."""
+        self._ledger.note(command)
         self._mode_known = self._mode_known or command in MODES
-        if command in POWERING:
-            self.released = POWERING[command]
-
-    def _misses_target(self, status: Status) -> bool:
-        """Whether an arm at rest is not where the last motion leads, and may yet settle; a fault if that stays so."""
-        target = self._books.target
-        if target is None or self._tolerance is None or self._fault or self._books.verified:
-            return False
-
-        here = target.told(status)
-        if here and target.miss(here) <= self._tolerance:
-            return False
-
-        if self._sight.now() < self._sight.rest_since + SETTLED:
-            return True
-
-        where = here or "somewhere that it does not tell"
-        self._fault = Missed(f"it came to rest at {where} instead of {target}: out of reach, not homed, or obstructed")
-        return False
-
-
-POWERING: Mapping[Command[Any, Any], bool] = MappingProxyType({c.RELEASE: True, c.POWER_ON: False})
-"""Whether the motors have no power after a command."""
+        self._stopper.note(command)

@@ -14,7 +14,6 @@ something. A program begins in absolute coordinates, and leaves the arm in them.
 
 from __future__ import annotations
 
-import asyncio
 import os
 import re
 from collections.abc import AsyncIterator, Callable, Generator, Iterable, Iterator, Sequence
@@ -22,8 +21,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dobot_async.errors import DobotError, ProtocolError
-from dobot_async.motion import Motion, MotionQueue, undisturbed
+from dobot_async._core.queue.motion import Motion
+from dobot_async._core.queue.queue import MotionQueue
+from dobot_async._core.util.tasks import Cleanup
+from dobot_async.errors import DobotError, MotionStopped, ProtocolError
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.frame import split_words
 from dobot_async.ultraarm.layouts import Words
@@ -61,7 +62,7 @@ class GCodeLine:
 
 
 def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> tuple[GCodeLine, ...]:
-    """Returns a program's commands; does no more than to read the file.
+    """Return a program's commands; do no more than to read the file.
 
     Args:
         source: A file's path, or lines.
@@ -92,7 +93,7 @@ def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> t
 
 
 def lines_of(source: Source) -> Iterable[str]:
-    """The lines of a program."""
+    """Return the lines of a program."""
     if isinstance(source, (str, os.PathLike)):
         return Path(source).read_text(encoding="utf-8-sig").splitlines()
 
@@ -115,7 +116,7 @@ class Reader:
         self._here: dict[str, float | None] = dict.fromkeys(AXES)
 
     def read(self, text: str) -> Iterator[tuple[Command[Any, Any], Any]]:
-        """Yields the commands of a line, each with its parameters."""
+        """Yield the commands of a line, each with its parameters."""
         if not text:
             return
 
@@ -138,7 +139,7 @@ class Reader:
             yield command, value
 
     def _groups(self, text: str) -> Iterator[tuple[str, list[str]]]:
-        """The words of a line, each command with its own."""
+        """Yield the commands of a line, each with its own words."""
         if EXPONENT.search(text):
             raise ValueError(f"{text!r} has an exponent, which the arm would read as its fourth axis")
 
@@ -164,7 +165,7 @@ class Reader:
         yield from groups
 
     def _checked(self, command: Command[Any, Any], value: Any) -> Any:
-        """The parameters with the speed that still holds; raises ValueError where the arm could not take them."""
+        """Return the parameters with the speed that still holds; raise ValueError where the arm could not take them."""
         if isinstance(value, (c.CoordsMove, c.JointMove, c.JointsMove)):
             self._speed = self._speed if value.f is None else value.f
             value = replace(value, f=self._speed)
@@ -183,7 +184,7 @@ class Reader:
         return value
 
     def _move(self, value: c.CoordsMove) -> None:
-        """Goes along with a motion, as far as it is known where it begins."""
+        """Go along with a motion, as far as it is known where it begins."""
         there = dict(self._here)
         for axis in AXES:
             given, at = getattr(value, axis), self._here[axis]
@@ -195,7 +196,7 @@ class Reader:
 
 
 def row_of(name: str) -> Command[Any, Any]:
-    """The row of a word; raises ValueError where a program cannot have it."""
+    """Return the row of a word; raise ValueError where a program cannot have it."""
     command = c.BY_WORD.get("G0" if name == "G1" else name)
     if command is None:
         raise ValueError(f"the arm has no command {name}")
@@ -207,7 +208,7 @@ def row_of(name: str) -> Command[Any, Any]:
 
 
 def letters_of(name: str) -> str:
-    """The letters that may stand behind a word."""
+    """Return the letters that may stand behind a word."""
     request = c.BY_WORD[name].request if name in c.BY_WORD else None
     return "".join(field.letter.letter for field in request.fields) if isinstance(request, Words) else ""
 
@@ -224,6 +225,7 @@ class GCodeRun:
     def __init__(
         self,
         queue: MotionQueue,
+        cleanup: Cleanup,
         lines: Sequence[GCodeLine],
         *,
         send: bool = True,
@@ -238,6 +240,7 @@ class GCodeRun:
 
         self.lines = tuple(lines)
         self._queue = queue
+        self._cleanup = cleanup
         self._todo = [*before, *lines, *after] if send and lines else []
         self._progress = progress
 
@@ -261,11 +264,15 @@ class GCodeRun:
                             count += 1
                             self._report(count)
                             yield line
-        except (asyncio.CancelledError, GeneratorExit):
-            await undisturbed(self._queue.stop())
-            raise
         except DobotError as error:
-            error.add_note(str(await self._failed(motions)))
+            error.add_note(str(self._failed(motions)))
+            raise
+        except BaseException as error:  # a cancellation, or who iterates has left; or `progress` has failed
+            stopped = MotionStopped("the program that it belonged to was cancelled, or left")
+            failure = await self._cleanup.finish(self._queue.begin_stop(stopped))
+            if failure:
+                error.add_note(str(failure))
+
             raise
 
     async def _run(self) -> None:
@@ -276,19 +283,16 @@ class GCodeRun:
         if self._progress:
             self._progress(done, len(self.lines))
 
-    async def _failed(self, motions: Sequence[Motion]) -> GCodeLine:
-        """The first line that is known to have failed; if there is none, the one that was to be sent next."""
+    def _failed(self, motions: Sequence[Motion]) -> GCodeLine:
+        """Return the first line that is known to have failed; if there is none, the one that was to be sent next."""
         for line, motion in zip(self._todo, motions, strict=False):
-            if motion.done:
-                try:
-                    await motion
-                except DobotError:
-                    return line
+            if motion.ended and motion.exception():
+                return line
 
         return self._todo[min(len(motions), len(self._todo) - 1)]
 
 
 def ends_relative(lines: Sequence[GCodeLine]) -> bool:
-    """Whether increments are what coordinates mean at the end."""
+    """Return whether increments are what coordinates mean at the end."""
     modes = [line.command for line in lines if line.command in {c.ABSOLUTE, c.RELATIVE}]
     return bool(modes) and modes[-1] is c.RELATIVE

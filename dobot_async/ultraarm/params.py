@@ -266,7 +266,7 @@ class UltraArmLimits:
     j4: Range
 
     def check(self, value: object) -> None:
-        """Raises ValueError for a target that is beyond the limits; increments are not looked at."""
+        """Raise ValueError for a target that is beyond the limits; increments are not looked at."""
         if isinstance(value, JointMove):
             self._check_axis(f"j{value.joint}", value.angle)
             return

@@ -12,18 +12,22 @@ arm. Wrong arguments raise ValueError or TypeError at once. The arm runs everyth
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, SupportsFloat, TypeVar
 
+from dobot_async._core.util.arguments import check_duration, to_float
 from dobot_async.ultraarm import commands as c
 from dobot_async.wire import Command
 
-__all__ = ["SPEED", "Pump", "Verbs"]
+__all__ = ["SPEED", "Pump", "Verbs", "check_speed"]
 
 T = TypeVar("T")
 Q = TypeVar("Q")
 Axis = float | None
 SPEED = 50.0
 """A careful speed."""
+
+SLOWEST, FASTEST = 1.0, 200.0
+LONGEST_WAIT = 65535.0
 
 Pump = Literal["manual", "vendor"]
 """Whether M23 starts the pump, as the manual says, or M22, as the vendor's library has it."""
@@ -40,10 +44,10 @@ class Verbs(Generic[T]):
 
     @abstractmethod
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> T:
-        """Does, or queues, or collects a command."""
+        """Do, or queue, or collect a command."""
 
     def home(self, *, timeout: float | None = None) -> T:
-        """Drives to the home switches, before which neither angles nor coordinates are right. Manual 5, G28."""
+        """Drive to the home switches, before which neither angles nor coordinates are right. Manual 5, G28."""
         return self.perform(c.HOME, None, timeout)
 
     def move_to(
@@ -56,7 +60,7 @@ class Verbs(Generic[T]):
         speed: float | None = SPEED,
         timeout: float | None = None,
     ) -> T:
-        """Moves the tool to a point; an axis that is not given stays. Manual 5, G0.
+        """Move the tool to a point; an axis that is not given stays. Manual 5, G0.
 
         Args:
             x: mm, forward.
@@ -66,7 +70,7 @@ class Verbs(Generic[T]):
             speed: mm/s, 1 to 200.
             timeout: Seconds.
         """
-        return self.perform(c.MOVE_COORDS, c.CoordsMove(*some(x, y, z, e), f=speed), timeout)
+        return self.perform(c.MOVE_COORDS, c.CoordsMove(*some(x, y, z, e), f=check_speed(speed)), timeout)
 
     def move_by(
         self,
@@ -78,8 +82,8 @@ class Verbs(Generic[T]):
         speed: float | None = SPEED,
         timeout: float | None = None,
     ) -> T:
-        """Moves the tool by mm (and `e` by degrees) from where it will be then. Manual 5, G91, G0 and G90."""
-        return self.perform(c.MOVE_BY, c.CoordsMove(*some(x, y, z, e), f=speed), timeout)
+        """Move the tool by mm (and `e` by degrees) from where it will be then. Manual 5, G91, G0 and G90."""
+        return self.perform(c.MOVE_BY, c.CoordsMove(*some(x, y, z, e), f=check_speed(speed)), timeout)
 
     def move_joints(
         self,
@@ -91,16 +95,21 @@ class Verbs(Generic[T]):
         speed: float | None = SPEED,
         timeout: float | None = None,
     ) -> T:
-        """Moves the joints to angles in degrees. Manual 5, M11."""
-        return self.perform(c.MOVE_JOINTS, c.JointsMove(j1, j2, j3, j4, speed), timeout)
+        """Move the joints to angles in degrees. Manual 5, M11."""
+        return self.perform(c.MOVE_JOINTS, c.JointsMove(j1, j2, j3, j4, check_speed(speed)), timeout)
 
     def move_joint(self, joint: int, angle: float, *, speed: float | None = SPEED, timeout: float | None = None) -> T:
-        """Moves one joint (1 to 4) to an angle in degrees. Manual 5, M10."""
-        return self.perform(c.MOVE_JOINT, c.JointMove(joint, angle, speed), timeout)
+        """Move one joint (1 to 4) to an angle in degrees. Manual 5, M10."""
+        return self.perform(c.MOVE_JOINT, c.JointMove(joint, angle, check_speed(speed)), timeout)
 
-    def wait(self, seconds: int, *, timeout: float | None = None) -> T:
-        """Holds the arm's queue for whole seconds, 0 to 65535. Manual 5, G4."""
-        return self.perform(c.WAIT, c.Dwell(seconds), timeout)
+    def wait(self, seconds: float, *, timeout: float | None = None) -> T:
+        """Hold the arm's queue for a time. Manual 5, G4.
+
+        Args:
+            seconds: 0 to 65535; the arm knows whole ones alone.
+            timeout: Seconds.
+        """
+        return self.perform(c.WAIT, c.Dwell(whole_seconds(seconds)), timeout)
 
     def set_position(
         self,
@@ -111,24 +120,24 @@ class Verbs(Generic[T]):
         *,
         timeout: float | None = None,
     ) -> T:
-        """Lets the arm take its place for another one: coordinates count from there. Manual 5, G92."""
+        """Let the arm take its place for another one: coordinates count from there. Manual 5, G92."""
         return self.perform(c.SET_POSITION, c.Position(*some(x, y, z, e)), timeout)
 
     def absolute(self, *, timeout: float | None = None) -> T:
-        """Lets `move_to` mean places, as it does unless told otherwise. Manual 5, G90."""
+        """Let `move_to` mean places, as it does unless told otherwise. Manual 5, G90."""
         return self.perform(c.ABSOLUTE, None, timeout)
 
     def relative(self, *, timeout: float | None = None) -> T:
-        """Lets `move_to` mean increments, until `absolute` or `move_by`. Manual 5, G91."""
+        """Let `move_to` mean increments, until `absolute` or `move_by`. Manual 5, G91."""
         return self.perform(c.RELATIVE, None, timeout)
 
     def set_speed_mode(self, mode: c.SpeedMode, *, timeout: float | None = None) -> T:
-        """Says how the arm runs through a series of motions: at constant speed, or each with its ramps."""
+        """Say how the arm runs through a series of motions: at constant speed, or each with its ramps."""
         return self.perform(c.SET_SPEED_MODE, c.ModeOfSpeed(mode), timeout)
 
     def suction(self, on: bool, *, timeout: float | None = None) -> T:
-        """Starts or stops the pump; see `pump` of `connect`. Manual 5, M22 and M23."""
-        starts = on is (self.pump == "manual")
+        """Start or stop the pump; see `pump` of `connect`. Manual 5, M22 and M23."""
+        starts = bool(on) == (self.pump == "manual")
         return self.perform(c.PUMP_ON if starts else c.PUMP_OFF, None, timeout)
 
     def gripper(
@@ -140,7 +149,7 @@ class Verbs(Generic[T]):
         mode: c.GripperMode | None = None,
         timeout: float | None = None,
     ) -> T:
-        """Opens the gripper to 0 (closed) to 100. Manual 5, M25.
+        """Open the gripper to 0 (closed) to 100. Manual 5, M25.
 
         Args:
             opening: Percent.
@@ -152,28 +161,49 @@ class Verbs(Generic[T]):
         return self.perform(c.SET_GRIPPER, c.GripperSet(opening, speed, kind, mode), timeout)
 
     def release_gripper(self, *, timeout: float | None = None) -> T:
-        """Takes the power off the gripper. Manual 5, M26."""
+        """Take the power off the gripper. Manual 5, M26."""
         return self.perform(c.RELEASE_GRIPPER, None, timeout)
 
     def laser(self, on: bool, *, timeout: float | None = None) -> T:
-        """Switches the laser. Manual 5, M3 and M5."""
+        """Switch the laser. Manual 5, M3 and M5."""
         return self.perform(c.LASER_ON if on else c.LASER_OFF, None, timeout)
 
     def pwm(self, duty: int, *, timeout: float | None = None) -> T:
-        """Sets the laser's duty cycle, 0 to 255. Manual 5, M21."""
+        """Set the laser's duty cycle, 0 to 255. Manual 5, M21."""
         return self.perform(c.SET_PWM, c.PWM(duty), timeout)
 
     def fan(self, on: bool, *, timeout: float | None = None) -> T:
-        """Switches the fan, which is on unless told otherwise; the motors need it. Manual 5, M27 and M28."""
+        """Switch the fan, which is on unless told otherwise; the motors need it. Manual 5, M27 and M28."""
         return self.perform(c.FAN_ON if on else c.FAN_OFF, None, timeout)
 
     def power_on(self, *, timeout: float | None = None) -> T:
-        """Lets the motors hold; after that the arm has to be homed. Manual 5, M18."""
+        """Let the motors hold; after that the arm has to be homed. Manual 5, M18."""
         return self.perform(c.POWER_ON, None, timeout)
 
 
+def check_speed(speed: SupportsFloat | None) -> float | None:
+    """Return a speed; raise ValueError or TypeError for one that the arm does not know."""
+    if speed is None:
+        return None
+
+    found = to_float(speed, "speed")
+    if not SLOWEST <= found <= FASTEST:
+        raise ValueError(f"speed must be in {SLOWEST:g} to {FASTEST:g} mm/s, not {speed!r}")
+
+    return found
+
+
+def whole_seconds(seconds: SupportsFloat) -> int:
+    """Return whole seconds to wait; raise ValueError or TypeError for others."""
+    found = check_duration(seconds, "seconds", LONGEST_WAIT)
+    if not found.is_integer():
+        raise ValueError(f"seconds must be whole, for the arm waits no others, not {seconds!r}")
+
+    return int(found)
+
+
 def some(x: Axis, y: Axis, z: Axis, e: Axis) -> tuple[Axis, Axis, Axis, Axis]:
-    """The axes; raises ValueError where there is none."""
+    """Return the axes; raise ValueError where there is none."""
     if x is y is z is e is None:
         raise ValueError("give at least one axis")
 

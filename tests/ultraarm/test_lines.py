@@ -13,9 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dobot_async.errors import ProtocolError
+from dobot_async.simulator import UltraArmQuirks
+from dobot_async.simulator.ultraarm import SimulatedUltraArm
 from dobot_async.ultraarm import commands as c
-from dobot_async.ultraarm.frame import LONGEST, Frame, Parser, encode
-from dobot_async.ultraarm.layouts import Answer, Receipt, Refusal, Status, Words, number
+from dobot_async.ultraarm.answers import Answer, Receipt, Refusal, Status
+from dobot_async.ultraarm.frame import BARRIERS, LONGEST, Frame, Parser, encode
+from dobot_async.ultraarm.layouts import Words, number
+from dobot_async.ultraarm.status import STATUS_AND_ANGLES
+from dobot_async.ultraarm.stopper import STOP_AND_STATUS
 from dobot_async.wire import Command
 
 Row = tuple[Command[Any, Any], Any]
@@ -25,6 +30,9 @@ VECTORS: list[dict[str, Any]] = json.loads((Path(__file__).parent / "vectors.jso
 
 def request(row: Command[Any, Any], value: Any) -> Frame:
     return encode(row, row.request.encode(value), queued=False)
+
+
+STOP, POLL = request(STOP_AND_STATUS, None), request(STATUS_AND_ANGLES, None)
 
 
 def text(row: Command[Any, Any], value: Any) -> str:
@@ -437,3 +445,78 @@ def test_what_the_simulator_writes_comes_back() -> None:
         reply: Any = row.reply
         assert reply.decode(reply.encode(value)) == value
         assert Answer[Any](reply).encode(value) == reply.encode(value)
+
+
+# Keys: what is asked for, and what is shown.
+
+
+def values() -> list[Row]:
+    """Each row with a value."""
+    given = {row: value for _, row, value in MANUAL}
+    asked: dict[Command[Any, Any], Any] = {
+        c.MOVE_BY: c.CoordsMove(z=5),
+        c.SET_SPEED_MODE: c.ModeOfSpeed(c.SpeedMode.CONSTANT),
+        c.SET_GRIPPER_CLOSE_POSITION: c.GripperClosePosition(c.GripperMode.ADAPTIVE, 20),
+        c.GET_GRIPPER_POSITION: c.ModeOfGripper(c.GripperMode.ADAPTIVE),
+        c.GET_GRIPPER_ANGLE: c.ModeOfGripper(c.GripperMode.ADAPTIVE),
+        c.SET_SERVO_REGISTER: c.ServoValue(7, 56, 1),
+        c.GET_SERVO_REGISTER: c.ServoRegister(7, 56),
+    }
+    return [(row, (given | asked).get(row)) for row in c.ALL]
+
+
+@pytest.mark.parametrize(
+    "quirks",
+    [
+        UltraArmQuirks(),
+        UltraArmQuirks(acknowledge="ok", blanks=False),
+        UltraArmQuirks(acknowledge="nothing"),
+        UltraArmQuirks(later=False),
+    ],
+    ids=str,
+)
+def test_what_the_arm_answers_has_the_key_of_what_it_was_asked(quirks: UltraArmQuirks) -> None:
+    arm = SimulatedUltraArm(lambda: 0.0, quirks=quirks)
+    session, parser = arm.session(), Parser()
+    for frame in [*(request(row, value) for row, value in values()), *BARRIERS, STOP, POLL]:
+        (answer,) = parser.feed(session.receive(bytes(frame)))
+        if quirks.later or b"M120" not in bytes(frame):
+            assert answer.key == frame.key
+
+    assert arm.counters.requests
+
+
+def test_barriers_are_like_nothing_else() -> None:
+    keys = [frame.key for frame in BARRIERS]
+    assert keys[:3] == ["M119 M119 M114", "M119 M12 M114", "M12 M119 M114"]
+    assert len(set(keys)) == len(keys) == 12
+    assert not set(keys) & {request(row, value).key for row, value in values()}
+    assert not any("M120" in key for key in keys)
+
+
+def test_an_answer_that_lost_something_is_nobodys() -> None:
+    status = request(c.GET_STATUS, None)
+    spoilt = {
+        "a reading": b"Moving end\r\nQUE SIZE[0]\r\n" + SWITCHES + END,
+        "a bracket": b"Moving end\r\nQUEUE SIZE[0\r\n" + SWITCHES + END,
+        "its end": b"Moving end\r\nQUEUE SIZE[0]\r\n" + SWITCHES + b"DATA : COO" + SWITCHES + END,
+    }
+    known = {frame.key for frame in BARRIERS} | {status.key}
+    for data in spoilt.values():
+        (frame,) = Parser().feed(data)
+        assert frame.key not in known
+
+    (twice,) = Parser().feed(b"QUEUE SIZE[1]\r\nok\r\nQUEUE SIZE[0]\r\n" + END)
+    assert twice.key == request(c.MOVE_COORDS, c.CoordsMove(1)).key == "M120 M114"
+
+
+@given(st.data())
+def test_an_answer_without_some_of_its_lines_is_no_receipt(data: st.DataObject) -> None:
+    """Whatever a barrier's answer loses, it acknowledges no command."""
+    frame = data.draw(st.sampled_from(BARRIERS))
+    lines = SimulatedUltraArm(lambda: 0.0).session().receive(bytes(frame)).splitlines(keepends=True)
+    left = b"".join(line for line in lines[:-1] if data.draw(st.booleans())) + lines[-1]
+    for found in Parser().feed(left):
+        assert found.key != request(c.HOME, None).key
+        with pytest.raises(ProtocolError):
+            c.HOME.reply.decode(found.params)

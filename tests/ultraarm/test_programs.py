@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from virtual import run_virtual
 
 from dobot_async import DobotError, UltraArm
-from dobot_async.motion import Motion
+from dobot_async._core.queue.motion import Motion
 from dobot_async.simulator import DeviceOptions, Faults, Simulation, UltraArmQuirks, simulate
 from dobot_async.ultraarm import commands as c
 

@@ -1,6 +1,6 @@
-"""The books of an ultraArm's queue: what was given to it, and what of that QUEUE SIZE proves done. No I/O.
+"""The ledger of an ultraArm's queue: what it was given, and what of that QUEUE SIZE proves done. No I/O.
 
-    given   G0  G0  M23  G0  G0  |          QUEUE SIZE[1]: one waits, one more may be executing,
+    taken   G0  G0  M23  G0  G0  |          QUEUE SIZE[1]: one waits, one more may be executing,
             done    done  `-- open          so that the last two motions, and what is behind them, are open
 
 The arm has no indices, so a ticket is our own count. Whether a setting takes room in the arm's queue is not known; only
@@ -15,12 +15,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from dobot_async.executor import Entry
+from dobot_async._core.queue.executor import Entry
 from dobot_async.ultraarm import commands as c
-from dobot_async.ultraarm.layouts import Status
+from dobot_async.ultraarm.answers import Status
 from dobot_async.wire import Command
 
-__all__ = ["MODES", "Books", "Given", "Target", "target_of"]
+__all__ = ["MODES", "QueueLedger", "TakenCommand", "Target", "UnackedCommand", "target_of"]
 
 AXES: Mapping[type, tuple[bool, Mapping[str, str]]] = MappingProxyType(
     {
@@ -37,14 +37,14 @@ class Target:
     joints: bool
     numbers: Mapping[str, float]
 
-    def told(self, status: Status) -> c.UltraArmCoords | c.UltraArmAngles | None:
-        """Returns where the arm said it is, in what the target is in; None if it did not."""
+    def position(self, status: Status) -> c.UltraArmCoords | c.UltraArmAngles | None:
+        """Return where the arm said it is, in what the target is in; None if it did not."""
         numbers = (status.angles if self.joints else status.coords)[:4]
         kind = c.UltraArmAngles if self.joints else c.UltraArmCoords
         return kind(*numbers) if len(numbers) >= 3 else None
 
-    def miss(self, here: c.UltraArmCoords | c.UltraArmAngles) -> float:
-        """Returns the greatest distance of an axis from the target, mm or degrees."""
+    def distance(self, here: c.UltraArmCoords | c.UltraArmAngles) -> float:
+        """Return the greatest distance of an axis from the target, mm or degrees."""
         return max((abs(getattr(here, name) - value) for name, value in self.numbers.items()), default=0.0)
 
     def __str__(self) -> str:
@@ -52,7 +52,7 @@ class Target:
 
 
 def target_of(entry: Entry, *, relative: bool = False) -> Target | None:
-    """Returns where a command leads, None if that depends on where the arm will be, or if it leads nowhere."""
+    """Return where a command leads, None if that depends on where the arm will be, or if it leads nowhere."""
     value: Any = entry.value
     if entry.command is c.MOVE_BY or (relative and entry.command is c.MOVE_COORDS):
         return None
@@ -69,19 +69,33 @@ def target_of(entry: Entry, *, relative: bool = False) -> Target | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class TakenCommand:
     """A command that the arm has taken."""
 
     ticket: int
     entry: Entry
 
 
-class Books:
+@dataclass(slots=True)
+class UnackedCommand:
+    """The command that was sent and of which nobody knows yet whether the arm took it.
+
+    Attributes:
+        entry: The command.
+        size: How many commands waited in the arm's queue before it was sent; None if that is not known.
+    """
+
+    entry: Entry
+    size: int | None
+
+
+class QueueLedger:
     """See the module.
 
     Attributes:
-        open: What is not known to be done, in order.
-        taken: The ticket of the last command; 0 before it.
+        open: What was taken and is not known to be done, in order.
+        unacked: What may have been taken.
+        last: The ticket of the last command that was taken; 0 before it.
         completed: The ticket of the last command that is known to be done; 0 before it.
         target: Where the arm stands once all is done, if the last motion tells.
         verified: Whether it was seen to stand there.
@@ -89,29 +103,31 @@ class Books:
     """
 
     def __init__(self) -> None:
-        self.open: deque[Given] = deque()
+        self.open: deque[TakenCommand] = deque()
+        self.unacked: UnackedCommand | None = None
+        self.last = 0
         self.completed = 0
         self.target: Target | None = None
         self.verified = False
         self.relative = False
-        self.taken = 0
 
-    def take(self, entry: Entry) -> int:
-        """Enters a command that the arm has taken; returns its ticket."""
-        self.taken += 1
-        self.open.append(Given(self.taken, entry))
+    def enter(self, entry: Entry) -> int:
+        """Enter a command that the arm has taken; return its ticket."""
+        self.unacked = None
+        self.last += 1
+        self.open.append(TakenCommand(self.last, entry))
         if entry.command.moves:
             self.target, self.verified = target_of(entry, relative=self.relative), False
 
-        return self.taken
+        return self.last
 
-    def waiting(self, size: int) -> int:
-        """So many commands wait in the arm's queue; returns the ticket of the last that is done."""
+    def done_by_size(self, size: int) -> int:
+        """So many commands wait in the arm's queue; return the ticket of the last one that is done."""
         motions = 0
         undone = len(self.open)
-        for given in reversed(self.open):
+        for taken in reversed(self.open):
             undone -= 1
-            motions += given.entry.command.moves
+            motions += taken.entry.command.moves
             if motions > size:
                 break
         else:
@@ -123,9 +139,9 @@ class Books:
         return self.completed
 
     def all_done(self) -> int:
-        """The arm rests, and nothing waits; returns the ticket of the last command."""
+        """The arm rests, and nothing waits; return the ticket of the last command."""
         self.open.clear()
-        self.completed = self.taken
+        self.completed = self.last
         self.verified = True
         return self.completed
 
@@ -138,31 +154,28 @@ class Books:
     def dwell(self) -> float:
         """Seconds that the arm is told to wait behind the last open motion: it may look idle meanwhile."""
         seconds = 0.0
-        for given in reversed(self.open):
-            if given.entry.command.moves:
+        for taken in reversed(self.open):
+            if taken.entry.command.moves:
                 break
 
-            if given.entry.command is c.WAIT:
-                seconds += given.entry.value.seconds
+            if taken.entry.command is c.WAIT:
+                seconds += taken.entry.value.seconds
 
         return seconds
 
-    @property
-    def unfinished_mode(self) -> bool:
-        """Whether an open command changes what coordinates mean."""
-        return any(given.entry.command in MODES or given.entry.command is c.MOVE_BY for given in self.open)
-
     def note(self, command: Command[Any, Any]) -> None:
-        """The arm has taken a command; notes what it means for the others."""
+        """Note what a command that the arm has taken means for the others."""
         self.relative = MODES.get(command, self.relative)
         if command in FORGETTING:
             self.target = None
 
-    def forget(self) -> None:
-        """Nothing is open any more."""
+    def forget(self) -> bool:
+        """Nothing is open any more; return whether that leaves it unknown what coordinates mean."""
+        entries = [taken.entry for taken in self.open] + ([self.unacked.entry] if self.unacked else [])
         self.open.clear()
-        self.completed = self.taken
-        self.target = None
+        self.unacked = self.target = None
+        self.completed = self.last
+        return any(entry.command in MODES or entry.command is c.MOVE_BY for entry in entries)
 
 
 MODES: Mapping[Command[Any, Any], bool] = MappingProxyType({c.ABSOLUTE: False, c.RELATIVE: True})
