@@ -11,7 +11,7 @@ from dobot_async.transports.base import Transport
 
 __all__ = ["SCHEMES", "Transport", "hidden", "open_transport"]
 
-TOKEN = re.compile(r"\btoken=[^&#]*")
+TOKEN = re.compile(r"\btoken=[^&]*", re.IGNORECASE)
 SCHEMES = {
     "serial": ("dobot_async.transports.serial", "serial:///dev/ttyUSB0, serial://COM3 (?baud=115200)"),
     "udp": ("dobot_async.transports.network", "udp://192.168.1.20 (port 8899)"),

@@ -47,7 +47,7 @@ class SerialLine:
         return len(self._waiting)
 
     def send(self, data: bytes) -> None:
-        """Puts bytes on the line, behind those that are on it."""
+        """Put bytes on the line, behind those that are on it."""
         if not self._waiting:
             self._free_at = max(self._free_at, self._loop.time())
 
@@ -55,14 +55,14 @@ class SerialLine:
         self._go()
 
     def clear(self) -> None:
-        """Forgets what has not arrived."""
+        """Forget what has not arrived."""
         self._waiting.clear()
         if self._timer:
             self._timer.cancel()
             self._timer = None
 
     def _go(self) -> None:
-        """Sets the timer for the next piece."""
+        """Set the timer for the next piece."""
         if self._waiting and not self._timer:
             size = min(self._piece, len(self._waiting))
             self._free_at += size * self._per_byte
@@ -79,28 +79,62 @@ class SerialLine:
 class Wired(Generic[P]):
     """A client behind its two lines."""
 
-    def __init__(self, baud: float, deliver: Callable[[bytes], None], hold: Callable[[bool], None]) -> None:
+    def __init__(
+        self,
+        baud: float,
+        deliver: Callable[[bytes], None],
+        hang_up: Callable[[], None],
+        hold: Callable[[bool], None],
+        leave: Callable[[P], None],
+    ) -> None:
         self.back = SerialLine(baud, deliver)
         self.peer: P | None = None
         self._there = SerialLine(baud, self._arrived)
+        self._hang_up = hang_up
         self._hold = hold
+        self._leave = leave
         self._held = False
+        self._open = True
+
+    def answer(self, data: bytes) -> None:
+        """Take what the host sends; nobody hears it once the client has gone."""
+        if self._open:
+            self.back.send(data)
 
     def send(self, data: bytes) -> None:
-        """Takes what the client has written; one that is far ahead of its line has to wait."""
+        """Take what the client has written; one that is far ahead of its line has to wait."""
         self._there.send(data)
         self._flow()
 
-    def clear(self) -> None:
-        """Forgets what is on the way."""
+    def hang_up(self) -> None:
+        """End the client; what it has sent and has not arrived is lost."""
         self._there.clear()
+        if self._open:
+            self._hang_up()
+        else:
+            self._left()
+
+    def close(self) -> None:
+        """Note that the client has gone; what it has sent before arrives first, as a UART sends it."""
+        self._open = False
         self.back.clear()
+        if not self._there.backlog:
+            self._left()
 
     def _arrived(self, data: bytes) -> None:
         if self.peer:
             self.peer.send(data)
 
-        self._flow()
+        if self._open:
+            self._flow()
+        elif not self._there.backlog:
+            self._left()
+
+    def _left(self) -> None:
+        """Tell the host, once, that its client has gone."""
+        peer, self.peer = self.peer, None
+        if peer:
+            self._leave(peer)
 
     def _flow(self) -> None:
         held = self._there.backlog >= AHEAD
@@ -130,13 +164,11 @@ class AtBaud(Generic[P]):
         hold: Callable[[bool], None] = lambda _: None,
         name: str = "",
     ) -> Wired[P]:
-        """Somebody has connected; see `Host`."""
-        wired: Wired[P] = Wired(self._baud, deliver, hold)
-        wired.peer = self._host.client(wired.back.send, hang_up, ordered=ordered, name=name)
+        """Connect somebody; see `Host`."""
+        wired: Wired[P] = Wired(self._baud, deliver, hang_up, hold, self._host.leave)
+        wired.peer = self._host.client(wired.answer, wired.hang_up, ordered=ordered, name=name)
         return wired
 
     def leave(self, client: Wired[P]) -> None:
-        """A client has gone."""
-        client.clear()
-        if client.peer:
-            self._host.leave(client.peer)
+        """Let a client go; the host hears of it when what the client had sent has arrived."""
+        client.close()

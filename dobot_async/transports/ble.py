@@ -27,16 +27,20 @@ from bleak.args.bluez import BlueZClientArgs
 from bleak.backends.characteristic import BleakGATTCharacteristic
 from bleak.exc import BleakCharacteristicNotFoundError
 
+from dobot_async._core.util.tasks import Ended, run_shielded, run_within
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.base import Transport, options
+from dobot_async.transports.base import Option, Transport, number, options, words
 from dobot_async.transports.ble_advice import NEAR, NOT_FOUND, trouble
 from dobot_async.transports.ble_claim import Claim, claim
 from dobot_async.transports.ble_scan import INPUT, OUTPUT, Seen, Wanted, connected, listening
-from dobot_async.transports.tasks import Ended, whole, within
 
 __all__ = ["PACE", "BleTransport", "open_url"]
 
 PACE = 0.02
+OPTIONS = {
+    "pace": number(float, "seconds between two chunks", least=0, most=1),
+    "adapter": Option(words, "a Bluetooth adapter of Linux, such as hci1"),
+}
 TICK = 0.001
 SCAN = 10.0
 CONNECT = 20.0
@@ -55,14 +59,11 @@ BUFFER = 1 << 16
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
     """Opens `ble://NAME`, `ble://ADDRESS` or `ble:`, with `?pace=` and, on Linux, `?adapter=hci1`."""
-    given = options(url, {"pace": float, "adapter": str})
+    given = options(url, OPTIONS)
     text = unquote(url.netloc + url.path)
     pace = given.get("pace", PACE)
-    if "/" in text or url.fragment:
-        raise ValueError("expected ble://NAME, ble://ADDRESS or ble: (a / or # in a name is %2F, %23)")
-
-    if not 0 <= pace <= 1:
-        raise ValueError(f"pace is seconds between chunks, 0 to 1, not {pace!r}")
+    if "/" in text:
+        raise ValueError("expected ble://NAME, ble://ADDRESS or ble: (a / in a name is %2F)")
 
     opening = Opening(url.geturl(), Wanted(text), pace, given.get("adapter"))
     try:
@@ -168,7 +169,7 @@ class Opening:
         try:
             await transport.connect()
         except BaseException:
-            await whole(transport.aclose())
+            await run_shielded(transport.aclose())
             raise
 
         return transport
@@ -183,7 +184,7 @@ class BleTransport:
 
     in_flight = 1
     window = 1
-    disorder = 0.0
+    reorder_window = 0.0
 
     def __init__(self, seen: Seen, *, url: str, pace: float, adapter: str | None, claim: Claim) -> None:
         self.url = url
@@ -208,7 +209,7 @@ class BleTransport:
 
     async def connect(self) -> None:
         """Connects, and asks for the notifications; raises what bleak does."""
-        await whole(check_version())
+        await run_shielded(check_version())
         await self._call(self._client.connect(), CONNECT)
         self._output = self._characteristic(OUTPUT)
         self._response = "write-without-response" not in self._output.properties
@@ -286,7 +287,7 @@ class BleTransport:
     async def _call(self, work: Any, seconds: float) -> None:
         """Awaits a call of bleak's, as long as there is a connection, or may be one."""
         try:
-            await within(seconds, work, until=self._lost)
+            await run_within(seconds, work, until=self._lost)
         except Ended:
             raise ConnectionError("the BLE connection was lost") from self._cause
 
@@ -300,7 +301,7 @@ class BleTransport:
 
         try:
             with suppress(Exception):  # a service that died cannot be told; bleak has released what it had
-                await within(DISCONNECT, self._client.disconnect())
+                await run_within(DISCONNECT, self._client.disconnect())
         finally:
             self._claim.drop()
 

@@ -21,8 +21,8 @@ from bleak.args.bluez import BlueZScannerArgs
 from bleak.backends.device import BLEDevice
 from bleak.backends.scanner import AdvertisementData
 
+from dobot_async._core.util.tasks import run_shielded, run_within
 from dobot_async.transports.ble_advice import ServiceHangs
-from dobot_async.transports.tasks import whole, within
 
 __all__ = ["INPUT", "OUTPUT", "SERVICE", "Seen", "Wanted", "connected", "listening"]
 
@@ -137,10 +137,10 @@ async def listening(adapter: str | None = None) -> AsyncIterator[asyncio.Queue[S
     heard: asyncio.Queue[Seen] = asyncio.Queue()
     listener = heard.put_nowait
     try:
-        await whole(scan.join(listener))  # a start that is given up half-way would leave BlueZ scanning
+        await run_shielded(scan.join(listener))  # a start that is given up half-way would leave BlueZ scanning
         yield heard
     finally:
-        await whole(scan.leave(listener))
+        await run_shielded(scan.leave(listener))
 
 
 def seen_as(device: BLEDevice, advertisement: AdvertisementData) -> Seen:
@@ -195,7 +195,7 @@ async def connections(adapter: str | None) -> tuple[list[Seen], list[Seen]]:
 async def answered(work: Coroutine[Any, Any, T]) -> T:
     """Awaits what the Bluetooth service does at once, unless it hangs."""
     try:
-        return await within(PATIENCE, work)
+        return await run_within(PATIENCE, work)
     except TimeoutError:
         raise ServiceHangs("the computer's Bluetooth service does not answer") from None
 

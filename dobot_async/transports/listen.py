@@ -9,18 +9,15 @@ tasks: the event loop calls, and the host answers when it likes.
 from __future__ import annotations
 
 import asyncio
-import socket
 import ssl
 from collections.abc import Callable
 from contextlib import AsyncExitStack
 from typing import Any, Generic, Protocol, TypeVar, cast
 
 from dobot_async.transports.base import MANY
+from dobot_async.transports.keep_alive import PeerWatch, keep_alive
 
 __all__ = ["Connection", "Datagrams", "Host", "Peer", "on_tcp", "on_udp", "url_of"]
-
-KEEPALIVE = {"TCP_KEEPIDLE": 3, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 6000}
-"""A client whose computer or network is gone is noticed within 6 s, where the system knows these options."""
 
 
 class Peer(Protocol):
@@ -104,7 +101,9 @@ class Connection(asyncio.Protocol, Generic[P]):
         """A client has connected."""
         self._transport = cast(asyncio.Transport, transport)
         self._held = self._full = False
-        keep_alive(transport.get_extra_info("socket"))
+        connection = transport.get_extra_info("socket")
+        keep_alive(connection)
+        self._watch = PeerWatch(connection, lambda _: self._transport.abort())
         name = url_of("tcp", transport.get_extra_info("peername"))
         self._client = self._host.client(
             self._transport.write, self._transport.abort, ordered=True, hold=self._hold, name=name
@@ -126,6 +125,7 @@ class Connection(asyncio.Protocol, Generic[P]):
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - it does not matter why
         """It has gone."""
+        self._watch.stop()
         self._host.leave(self._client)
 
     def _hold(self, held: bool) -> None:
@@ -137,14 +137,6 @@ class Connection(asyncio.Protocol, Generic[P]):
             self._transport.pause_reading()
         else:
             self._transport.resume_reading()
-
-
-def keep_alive(connection: socket.socket) -> None:
-    """Has the system find out whether the other side is still there."""
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    for name, value in KEEPALIVE.items():
-        if hasattr(socket, name):
-            connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
 
 class Datagrams(asyncio.DatagramProtocol, Generic[P]):

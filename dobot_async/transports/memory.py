@@ -7,7 +7,7 @@ import math
 import anyio
 from anyio.streams.stapled import StapledObjectStream
 
-from dobot_async.transports.base import MANY, Transport, Wrapped
+from dobot_async.transports.base import MANY, StreamTransport, Transport
 
 __all__ = ["memory_pair"]
 
@@ -22,6 +22,6 @@ def memory_pair(*, in_flight: int = MANY, window: int = 16, buffer: float = math
     """
     there_send, there_receive = anyio.create_memory_object_stream[bytes](buffer)
     back_send, back_receive = anyio.create_memory_object_stream[bytes](buffer)
-    near = StapledObjectStream(there_send, back_receive)
-    far = StapledObjectStream(back_send, there_receive)
-    return Wrapped(near, in_flight=in_flight, window=window), Wrapped(far, in_flight=in_flight, window=window)
+    ends = StapledObjectStream(there_send, back_receive), StapledObjectStream(back_send, there_receive)
+    near, far = (StreamTransport(end, in_flight=in_flight, window=window) for end in ends)
+    return near, far

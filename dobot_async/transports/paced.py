@@ -30,9 +30,9 @@ class Paced:
         self._free_at = self._loop.time()
 
     @property
-    def disorder(self) -> float:
+    def reorder_window(self) -> float:
         """That of the inner transport."""
-        return self._inner.disorder
+        return self._inner.reorder_window
 
     async def send(self, data: bytes) -> None:
         """Sends one frame, once the gap after the last one is over; cancelled before that, it has sent nothing."""

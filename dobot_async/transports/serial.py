@@ -12,32 +12,29 @@ import os
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
 from urllib.parse import SplitResult
 
-import anyio
 import serial
 from serial_asyncio import connection_for_serial
 
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.base import MANY, Transport, options
+from dobot_async.transports.base import Transport, number, options
+from dobot_async.transports.byte_stream import DRAIN, ByteStreamTransport
 
 __all__ = ["SerialTransport", "open_url"]
 
 BAUD = 115200
-WINDOW = 16
-DRAIN = 0.5
+OPTIONS = {"baud": number(int, "bits per second", least=50, most=12_000_000)}
 POLL = 0.005
-BUFFER = 1 << 16
 POSIX = os.name == "posix"
 
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
-    """Opens `serial:///dev/ttyUSB0` or `serial://COM3`, with `?baud=` if it is not 115200."""
+    """Open `serial:///dev/ttyUSB0` or `serial://COM3`, with `?baud=` if it is not 115200."""
     path = url.netloc + url.path
-    baud = options(url, {"baud": int}).get("baud", BAUD)
-    if not path or baud <= 0:
-        raise ValueError("expected serial:///dev/ttyUSB0 or serial://COM3, and a baud rate above 0")
+    baud = options(url, OPTIONS).get("baud", BAUD)
+    if not path:
+        raise ValueError("expected serial:///dev/ttyUSB0 or serial://COM3")
 
     port = (Port if POSIX else serial.Serial)(None, baudrate=baud, exclusive=True if POSIX else None)
     port.port = path
@@ -61,7 +58,7 @@ class Port(serial.Serial):
     """A port that is read when there is something to read: pyserial would ask the system for that once more."""
 
     def read(self, size: int | None = 1) -> bytes:
-        """Returns what is there; raises SerialException if that is nothing, for then the port is gone."""
+        """Return what is there; raise SerialException if that is nothing, for then the port is gone."""
         try:
             data = os.read(self.fileno(), size or 1)
         except (BlockingIOError, InterruptedError):
@@ -75,128 +72,26 @@ class Port(serial.Serial):
         return data
 
 
-class SerialTransport(asyncio.Protocol):
+class SerialTransport(ByteStreamTransport):
     """An open serial port."""
 
-    in_flight = MANY
-    window = WINDOW
-    disorder = 0.0
-
     def __init__(self) -> None:
-        loop = asyncio.get_running_loop()
-        self._loop = loop
-        self._lost: asyncio.Future[None] = loop.create_future()
-        self._cause: BaseException | None = None
-        self._closing = False
-        self._transport: Any = None
+        super().__init__()
         self._port: int | None = None  # what the system knows it by, if it takes bytes at once
-        self._buffer = bytearray()
-        self._arrived: asyncio.Future[None] | None = None
-        self._take: Callable[[bytes], None] | None = None
-        self._writable = asyncio.Event()
-        self._writable.set()
-
-    async def send(self, data: bytes) -> None:
-        """Writes one frame; waits while the output is full."""
-        self._check()
-        self._put(data)
-        if not self._writable.is_set():
-            await self._writable.wait()
-            self._check()
-
-    def write(self, data: bytes) -> bool:
-        """Writes one frame now; False if the output is full or the port is gone."""
-        if self._closing or self._lost.done() or not self._writable.is_set():
-            return False
-
-        self._put(data)
-        return True
-
-    async def receive(self) -> bytes:
-        """Returns what has arrived, at least one byte."""
-        while not self._buffer:
-            self._check()
-            self._arrived = self._loop.create_future()
-            await self._arrived
-
-        data = bytes(self._buffer)
-        self._buffer.clear()
-        if not self._lost.done():
-            self._transport.resume_reading()
-
-        return data
-
-    async def deliver(self, take: Callable[[bytes], None]) -> None:
-        """Hands over what arrives as soon as it does; raises as `receive` when nothing more does."""
-        if self._buffer:
-            take(await self.receive())
-
-        self._take = take
-        try:
-            while True:
-                self._check()
-                self._arrived = self._loop.create_future()
-                await self._arrived
-        finally:
-            self._take = None
-
-    async def aclose(self) -> None:
-        """Closes the port; what cannot be written within half a second is thrown away."""
-        if not self._closing:
-            self._closing = True
-            try:
-                await self._drain()
-            finally:
-                self._abort()
-
-        await asyncio.shield(self._lost)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """The port is open; pyserial-asyncio calls this once more, a little after it has returned the transport."""
-        self._transport = transport
+        """Keep the open port; pyserial-asyncio calls this once more, a little after it has returned the transport."""
+        super().connection_made(transport)
         self._port = self._transport.serial.fd if POSIX else None
 
-    def data_received(self, data: bytes) -> None:
-        """Hands over what arrives, or keeps it; stops reading while nobody takes it."""
-        if self._take:
-            try:
-                self._take(data)
-            except Exception as error:  # noqa: BLE001 - it is raised where `deliver` is awaited
-                self._take = None
-                if self._arrived and not self._arrived.done():
-                    self._arrived.set_exception(error)
-
-            return
-
-        self._buffer += data
-        if len(self._buffer) > BUFFER:
-            self._transport.pause_reading()
-
-        self._wake()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """Called once, when the port is gone or closed."""
-        self._cause = exc or self._cause
-        self._lost.set_result(None)
-        self._writable.set()
-        self._wake()
-
-    def pause_writing(self) -> None:
-        """The output is full."""
-        self._writable.clear()
-
-    def resume_writing(self) -> None:
-        """The output has room again."""
-        self._writable.set()
-
     def _put(self, data: bytes) -> None:
-        """Hands bytes to the port, and what it does not take at once to its output."""
+        """Hand bytes to the port, and what it does not take at once to its output."""
         rest = self._written(data)
         if rest:
             self._transport.write(rest)
 
     def _written(self, data: bytes) -> bytes:
-        """Writes what the port takes at once, and returns the rest.
+        """Write what the port takes at once, and return the rest.
 
         pyserial-asyncio would have the loop ask the system first whether the port takes it: that costs more than the
         rest of a request together.
@@ -213,19 +108,8 @@ class SerialTransport(asyncio.Protocol):
             self._abort()
             return b""
 
-    def _wake(self) -> None:
-        if self._arrived and not self._arrived.done():
-            self._arrived.set_result(None)
-
-    def _check(self) -> None:
-        if self._closing:
-            raise anyio.ClosedResourceError
-
-        if self._lost.done():
-            raise anyio.BrokenResourceError from self._cause
-
     async def _drain(self) -> None:
-        """Waits for the output for a moment, then throws away what the port did not take."""
+        """Wait for the output for a moment, then throw away what the port did not take."""
         if self._lost.done():
             return
 
@@ -250,13 +134,13 @@ class SerialTransport(asyncio.Protocol):
             return
 
     def _abort(self) -> None:
-        """Ends the transport, exactly once: one that ends by itself is left alone, unless output keeps it from it."""
+        """End the port, exactly once: one that ends by itself is left alone, unless output keeps it from it."""
         if not self._lost.done() and (not self._transport.is_closing() or self._transport.get_write_buffer_size()):
             self._transport.abort()
 
 
 async def in_thread(call: Callable[[], None], undo: Callable[[], None]) -> None:
-    """Runs a blocking call in a thread that ends with it; undoes it if the caller is cancelled meanwhile."""
+    """Run a blocking call in a thread that ends with it; undo it if the caller is cancelled meanwhile."""
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
     order: list[str] = []  # whoever comes second sees it here, and undoes the call if it was abandoned

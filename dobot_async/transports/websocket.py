@@ -12,19 +12,23 @@ import anyio
 
 from dobot_async.errors import ConnectFailed
 from dobot_async.transports.base import MANY, Transport, options
-from dobot_async.transports.network import WINDOW, secret, trust
+from dobot_async.transports.keep_alive import keep_alive
+from dobot_async.transports.network import CA, TOKEN, WINDOW, trust
 
 __all__ = ["WebSocketTransport", "open_url", "quiet", "websockets"]
 
-PING, PONG_WITHIN = 3.0, 6.0  # seconds; so a computer that is gone is noticed
-CLOSE = 1.0
+PING, PONG_WITHIN = (
+    2.0,
+    6.0,
+)  # seconds; so a computer that is gone is noticed where the system does not notice it earlier
+CLOSE = 0.5
+OPTIONS = {"ws": {"token": TOKEN}, "wss": {"token": TOKEN, "ca": CA}}
 UNAUTHORIZED = 401
 
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
-    """Opens `ws://host:port` or `wss://host:port`; both take `?token=`, and wss `?ca=` as tcp does."""
-    known: dict[str, Any] = {"token": secret, "ca": str} if url.scheme == "wss" else {"token": secret}
-    given = options(url, known)
+    """Open `ws://host:port` or `wss://host:port`; both take `?token=`, and wss `?ca=` as tcp does."""
+    given = options(url, OPTIONS[url.scheme])
     if not url.hostname or url.port == 0 or url.path.strip("/"):
         raise ValueError(f"expected {url.scheme}://host:port")
 
@@ -38,7 +42,7 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 
             compression=None,
             ping_interval=PING,
             ping_timeout=PONG_WITHIN,
-            close_timeout=0.5,
+            close_timeout=CLOSE,
             proxy=None,
             logger=quiet(),
         )
@@ -49,11 +53,12 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 
         wrong = "its token is another one" if getattr(response, "status_code", 0) == UNAUTHORIZED else str(error)
         raise ConnectFailed(f"{place} does not let this client in: {wrong}") from error
 
+    keep_alive(socket.transport.get_extra_info("socket"))
     return WebSocketTransport(socket, websockets("exceptions").ConnectionClosed)
 
 
 def websockets(module: str) -> ModuleType:
-    """Returns a module of the websockets library; raises ConnectFailed where it is not installed."""
+    """Return a module of the websockets library; raise ConnectFailed where it is not installed."""
     try:
         from websockets import exceptions  # noqa: PLC0415 - only who uses WebSocket needs it
         from websockets.asyncio import client, server  # noqa: PLC0415
@@ -64,7 +69,7 @@ def websockets(module: str) -> ModuleType:
 
 
 def quiet() -> logging.Logger:
-    """Returns a logger that says nothing: the library would write the token down."""
+    """Return a logger that says nothing: the library would write the token down."""
     logger = logging.getLogger("dobot_async.websockets")
     logger.disabled = True
     return logger
@@ -75,7 +80,7 @@ class WebSocketTransport:
 
     in_flight = MANY
     window = WINDOW
-    disorder = 0.0
+    reorder_window = 0.0
 
     def __init__(self, socket: Any, closed: type[Exception]) -> None:
         self._socket = socket
@@ -83,17 +88,20 @@ class WebSocketTransport:
         self._closing = False
 
     async def send(self, data: bytes) -> None:
-        """Sends one binary message."""
+        """Send one binary message; cancelled, it is sent whole or not at all."""
         if self._closing:
             raise anyio.ClosedResourceError
 
         try:
             await self._socket.send(data)
         except self._closed as error:
-            raise anyio.BrokenResourceError from error
+            raise self._over() from why(error)
+
+        if self._closing:
+            raise anyio.ClosedResourceError
 
     async def receive(self) -> bytes:
-        """Returns the next binary message; text is for people, and left out."""
+        """Return the next binary message; text is for people, and left out."""
         while True:
             if self._closing:
                 raise anyio.ClosedResourceError
@@ -101,16 +109,17 @@ class WebSocketTransport:
             try:
                 message = await self._socket.recv()
             except self._closed as error:
-                if self._closing:
-                    raise anyio.ClosedResourceError from None
-
-                raise anyio.BrokenResourceError from error
+                raise self._over() from why(error)
 
             if isinstance(message, bytes) and message:
                 return message
 
+    def _over(self) -> Exception:
+        """Return what is raised when the library says that it is closed."""
+        return anyio.ClosedResourceError() if self._closing else anyio.BrokenResourceError()
+
     async def aclose(self) -> None:
-        """Closes it, within a second."""
+        """Close it, within a second."""
         self._closing = True
         try:
             async with asyncio.timeout(CLOSE):
@@ -122,3 +131,8 @@ class WebSocketTransport:
             raise
 
         await self._socket.wait_closed()
+
+
+def why(closed: Exception) -> Exception:
+    """Return why a WebSocket is closed: what the system says, if it has ended it, else what the library says."""
+    return closed.__cause__ if isinstance(closed.__cause__, OSError) else closed

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import SplitResult, urlencode
 
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.base import options
+from dobot_async.transports.base import Option, options, words
 
 if TYPE_CHECKING:
     import zenoh
@@ -82,8 +82,7 @@ class Place:
         Raises:
             ValueError: It is none.
         """
-        known: dict[str, Any] = {"config": str, "connect": endpoints}
-        found = options(url, {**known, "listen": endpoints, "lan": yes} if serving else known)
+        found = options(url, CLIENT | SERVER if serving else CLIENT)
         if not NAME.fullmatch(url.netloc) or url.path.strip("/"):
             raise ValueError("expected zenoh://name, of letters, digits, dots, - and _")
 
@@ -152,3 +151,8 @@ def yes(text: str) -> bool:
         raise ValueError
 
     return True
+
+
+ENDPOINTS = Option(endpoints, "endpoints with commas between them, such as tcp/192.168.1.20:7447")
+CLIENT = {"config": Option(words, "a configuration file of Zenoh's"), "connect": ENDPOINTS}
+SERVER = {"listen": ENDPOINTS, "lan": Option(yes, "yes")}

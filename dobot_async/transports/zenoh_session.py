@@ -19,8 +19,8 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from dobot_async._core.util.tasks import run_shielded, run_within
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.tasks import whole, within
 from dobot_async.transports.zenoh_place import Place, library, reason
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class Session:
             begin(self._zenoh)
 
         try:
-            await whole(asyncio.to_thread(start))
+            await run_shielded(asyncio.to_thread(start))
         except zenoh.ZError as error:
             raise ConnectFailed(f"Zenoh cannot be started: {reason(error)}") from None
 
@@ -121,7 +121,7 @@ class Session:
         session, self._zenoh = self._zenoh, None
         if session:
             with suppress(TimeoutError, library().ZError):
-                await whole(within(CLOSED, asyncio.to_thread(session.close)))
+                await run_shielded(run_within(CLOSED, asyncio.to_thread(session.close)))
 
 
 class Crossing:

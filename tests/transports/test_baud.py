@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,9 @@ from virtual import run_virtual, virtual
 
 from dobot_async import Magician
 from dobot_async.simulator import simulate
+from dobot_async.transports import open_transport
 from dobot_async.transports.baud import AHEAD, AtBaud, SerialLine, Wired
+from dobot_async.transports.terminal import on_pty
 
 BAUD = 115200
 BYTE = 10 / BAUD
@@ -103,6 +106,9 @@ class Echo:
 
     def __init__(self) -> None:
         self.gone: list[EchoClient] = []
+        self.hang_ups: list[Callable[[], None]] = []
+        self.heard = bytearray()
+        self.left = asyncio.Event()
 
     def client(
         self,
@@ -113,15 +119,22 @@ class Echo:
         hold: Callable[[bool], None] = lambda _: None,
         name: str = "",
     ) -> EchoClient:
-        return EchoClient(deliver)
+        self.hang_ups.append(hang_up)
+        return EchoClient(self, deliver)
 
     def leave(self, client: EchoClient) -> None:
         self.gone.append(client)
+        self.left.set()
 
 
 class EchoClient:
-    def __init__(self, deliver: Callable[[bytes], None]) -> None:
-        self.send = deliver
+    def __init__(self, host: Echo, deliver: Callable[[bytes], None]) -> None:
+        self._host = host
+        self._deliver = deliver
+
+    def send(self, data: bytes) -> None:
+        self._host.heard += data
+        self._deliver(data)
 
 
 @virtual
@@ -138,11 +151,58 @@ async def test_both_ways_have_their_own_line_and_a_client_far_ahead_is_held() ->
     assert len(received) >= AHEAD  # the echo comes while the rest is still on its way
     await asyncio.sleep(MILLISECOND)
     assert len(received) == AHEAD + 100
-    client.send(b"lost")
+    peer = client.peer
+    client.send(b"heard")
     slow.leave(client)
+    assert not host.gone  # before what it has sent has arrived
+    await asyncio.sleep(5 * BYTE + MILLISECOND)
+    assert host.heard[-5:] == b"heard"
+    assert host.gone == [peer]
     await asyncio.sleep(1)
-    assert len(received) == AHEAD + 100
-    assert host.gone == [client.peer]
+    assert len(received) == AHEAD + 100  # nobody is there for the echo
+
+
+@virtual
+async def test_a_client_that_has_sent_nothing_leaves_at_once_and_one_that_is_hung_up_on_is_not_waited_for() -> None:
+    host = Echo()
+    slow = AtBaud(host, BAUD)
+    hung_up: list[int] = []
+
+    def connected() -> Wired[EchoClient]:
+        return slow.client(lambda _: None, lambda: hung_up.append(1), ordered=True)
+
+    slow.leave(connected())
+    assert len(host.gone) == 1
+    there, gone = connected(), connected()
+    there.send(b"lost")
+    host.hang_ups[1]()
+    assert hung_up == [1]
+    slow.leave(there)
+    gone.send(b"lost")
+    slow.leave(gone)
+    assert len(host.gone) == 2
+    host.hang_ups[2]()
+    assert hung_up == [1]  # it is gone: whoever has its port now is somebody else
+    assert len(host.gone) == 3
+    await asyncio.sleep(1)
+    assert not host.heard
+    assert len(host.gone) == 3
+
+
+@pytest.mark.skipif(not Path("/dev/ptmx").exists(), reason="no pseudo-terminals")
+async def test_what_was_written_before_a_port_is_closed_arrives() -> None:
+    async with AsyncExitStack() as stack:
+        host = Echo()
+        url = await on_pty(AtBaud(host, 9600), stack, lasting=False)
+        transport = await open_transport(f"{url}?baud=9600", arm="magician")
+        for number in range(10):
+            await transport.send(bytes((number,)) * 20)
+
+        await transport.aclose()
+        async with asyncio.timeout(5):
+            await host.left.wait()
+
+        assert host.heard == b"".join(bytes((number,)) * 20 for number in range(10))
 
 
 @pytest.mark.skipif(not Path("/dev/ptmx").exists(), reason="no pseudo-terminals")

@@ -48,13 +48,13 @@ from bleak.exc import (
 from dbus_fast import Message
 from dbus_fast.aio import MessageBus
 
+from dobot_async._core.util.tasks import Ended, run_shielded, run_within
 from dobot_async.simulator import bluez
 from dobot_async.simulator.ble_module import Module
 from dobot_async.simulator.ble_names import ADAPTER
 from dobot_async.simulator.ble_rig import Rig, rig
 from dobot_async.simulator.radio import Radio, round_trip
 from dobot_async.transports import ble, ble_advice, ble_claim, ble_scan
-from dobot_async.transports.tasks import Ended, whole, within
 
 DAEMON = shutil.which("dbus-daemon")
 if not DAEMON and not os.environ.get("DOBOT_REQUIRE_DBUS"):
@@ -180,10 +180,10 @@ def descriptors() -> int:
     [
         ("ble://arm/1", "expected ble://NAME.*%2F"),
         ("ble:///dev/ttyUSB0", "expected ble://NAME"),
-        ("ble://arm#1", "expected ble://NAME.*%23"),
-        ("ble://arm?pace=fast", "pace='fast' is no float"),
-        ("ble://arm?pace=-1", "pace is seconds between chunks"),
-        ("ble://arm?pace=nan", "pace is seconds between chunks"),
+        ("ble://arm#1", "a # in a URL is written %23"),
+        ("ble://arm?pace=fast", "pace='fast': expected seconds"),
+        ("ble://arm?pace=-1", "pace=.*expected seconds between two chunks"),
+        ("ble://arm?pace=nan", "pace=.*expected seconds between two chunks"),
         ("ble://arm?speed=1", "unknown option 'speed'; known: pace, adapter"),
         ("ble:?adapter=hci0&adapter=hci1", "option adapter is given twice"),
     ],
@@ -231,7 +231,7 @@ def test_who_is_wanted(text: str, who: ble_scan.Seen, fits: bool) -> None:
 async def test_an_arm_is_found(module: Module, url: str) -> None:
     async with opened(url) as transport:
         assert await ask(transport) == c.GET_POSE.id
-        assert (transport.in_flight, transport.window, transport.disorder) == (1, 1, 0.0)
+        assert (transport.in_flight, transport.window, transport.reorder_window) == (1, 1, 0.0)
 
 
 async def test_an_arm_is_found_by_its_service_alone(module: Module) -> None:
@@ -499,6 +499,30 @@ async def test_a_frame_that_has_begun_is_sent_to_its_end(module: Module) -> None
         await transport.send(GET_POSE)
         assert [frame.id for frame in await frames(transport, 2)] == [c.SET_PTP_CMD.id, c.GET_POSE.id]
         assert b"".join(module.written) == MOVE + GET_POSE
+
+
+async def test_a_send_on_a_connection_that_takes_nothing_can_be_cancelled(
+    module: Module, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loop = asyncio.get_running_loop()
+
+    async def hang(client: Any, *args: Any, **options: Any) -> None:
+        await loop.create_future()
+
+    async with opened(module.url) as transport:
+        monkeypatch.setattr(BleakClient, "write_gatt_char", hang)
+        monkeypatch.setattr(ble, "GATT", 1.0)
+        for _ in range(2):
+            sending = asyncio.create_task(transport.send(MOVE))
+            await asyncio.sleep(0.05)
+            begun = loop.time()
+            sending.cancel()
+            await asyncio.wait([sending])
+            assert sending.cancelled()
+            assert loop.time() - begun < 0.3
+
+        await broken(transport.send(GET_POSE), "did not answer in time")
+        assert module.written == []
 
 
 async def test_a_burst_of_notifications_arrives_in_order(module: Module) -> None:
@@ -872,11 +896,11 @@ async def test_a_whole_call_comes_to_its_end() -> None:
         return "done"
 
     asyncio.get_running_loop().call_soon(may.set)
-    assert await whole(work()) == "done"
+    assert await run_shielded(work()) == "done"
     for event in (begun, may, done):
         event.clear()
 
-    task = asyncio.create_task(whole(work()))
+    task = asyncio.create_task(run_shielded(work()))
     await begun.wait()
     task.cancel()
     await asyncio.sleep(0)
@@ -899,15 +923,15 @@ async def test_a_call_ends_with_its_time_or_with_what_it_is_for() -> None:
             cleaned.append(True)
 
     with pytest.raises(TimeoutError):
-        await within(0.001, work())
+        await run_within(0.001, work())
 
     over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
     over.set_result(None)
     with pytest.raises(Ended):
-        await within(IN_TIME, work(), until=over)
+        await run_within(IN_TIME, work(), until=over)
 
     with anyio.move_on_after(0.001):
-        await within(IN_TIME, work())
+        await run_within(IN_TIME, work())
 
     assert len(cleaned) == 3
 

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import ssl
 import struct
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import anyio
 import pytest
+import trustme
 
+from dobot_async._core.link.link import Link
 from dobot_async.contract import LinkState
 from dobot_async.errors import ConnectFailed, ConnectionLost, ReplyTimeout
-from dobot_async.link import Link
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import Frame, Parser, request
 from dobot_async.transports import open_transport
 
 POSE = c.Pose(*map(float, range(8)))
 POSE_REPLY = Frame(10, 0, struct.pack("<8f", *range(8)))
+BARRIERS = [request(row, b"", queued=False) for row in (c.GET_POSE, c.GET_ALARMS_STATE)]
 POSE_REQUEST = bytes.fromhex("aa aa 02 0a 00 f6")
 HOSTS = ["127.0.0.1", "[::1]"]
 
@@ -49,7 +54,7 @@ def host(request: pytest.FixtureRequest) -> str:
 async def linked(url: str) -> AsyncIterator[Link[Frame]]:
     """A link to a URL."""
     transport = await open_transport(url, arm="magician")
-    async with aclosing(Link(transport, Parser(), request, url=url)) as link:
+    async with aclosing(Link(transport, Parser(), request, url=url, barriers=BARRIERS)) as link:
         yield link
 
 
@@ -94,6 +99,9 @@ async def tcp_peer(host: str = "127.0.0.1") -> AsyncIterator[TcpPeer]:
         yield peer
     finally:
         server.close()
+        for _ in range(5):
+            await asyncio.sleep(0)  # somebody may have come just now
+
         if peer.connected.done():
             peer.connected.result()[1].transport.abort()
 
@@ -202,7 +210,7 @@ async def test_tcp_frames_may_come_together() -> None:
     async with tcp_peer() as peer, linked(peer.url) as link:
         calls = [asyncio.create_task(link.request(command, None)) for command in (c.GET_POSE, c.GET_DEVICE_NAME)]
         await peer.read(12)
-        await peer.write(b"junk" + bytes(Frame(1, 0, b"arm\0")) + bytes(POSE_REPLY))
+        await peer.write(b"junk" + bytes(POSE_REPLY) + bytes(Frame(1, 0, b"arm\0")))
         assert await asyncio.gather(*calls) == [POSE, "arm"]
 
 
@@ -268,6 +276,106 @@ async def test_connecting_over_tcp_may_be_cancelled_anywhere() -> None:
                 await opening.result().aclose()
 
 
+# TLS
+
+
+@dataclass
+class Fence:
+    """A port behind which somebody hangs up on the first callers in the middle of the handshake."""
+
+    port: int
+    hang_ups: int
+    reset: bool
+    calls: int = 0
+
+
+@asynccontextmanager
+async def hanging_up(hang_ups: int, certificate: trustme.LeafCert, *, reset: bool = False) -> AsyncIterator[Fence]:
+    """Hangs up on some callers, then lets the others through to a TLS server that answers with poses."""
+    tls = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    certificate.configure_cert(tls)
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        fence.calls += 1
+        if fence.calls <= fence.hang_ups:
+            await reader.read(1)
+            if fence.reset:
+                linger = struct.pack("ii", 1, 0)
+                writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+
+            writer.transport.abort()
+            return
+
+        await writer.start_tls(tls)
+        while await reader.read(100):
+            writer.write(bytes(POSE_REPLY))
+
+        writer.close()
+
+    server = await asyncio.start_server(answer, "127.0.0.1", 0)
+    fence = Fence(server.sockets[0].getsockname()[1], hang_ups, reset)
+    try:
+        yield fence
+    finally:
+        server.close()
+        await server.wait_closed()
+        await asyncio.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def authority() -> trustme.CA:
+    """Who signs certificates."""
+    return trustme.CA()
+
+
+@pytest.fixture
+def ca(authority: trustme.CA, tmp_path: Path) -> Path:
+    """Its own certificate, as a file."""
+    authority.cert_pem.write_to_path(tmp_path / "ca.pem")
+    return tmp_path / "ca.pem"
+
+
+@pytest.mark.parametrize("reset", [False, True])
+@pytest.mark.parametrize("scheme", ["tcp", "wss"])
+async def test_a_hang_up_in_the_tls_handshake_is_a_failed_connection(
+    scheme: str, reset: bool, authority: trustme.CA, ca: Path
+) -> None:
+    async with hanging_up(1, authority.issue_cert("127.0.0.1"), reset=reset) as fence:
+        with pytest.raises(ConnectFailed, match=r"cannot reach .*is the address right"):
+            await open_transport(f"{scheme}://127.0.0.1:{fence.port}?ca={ca}", arm="magician")
+
+
+async def test_a_hang_up_in_the_tls_handshake_is_tried_again_where_a_link_is_reopened(
+    authority: trustme.CA, ca: Path
+) -> None:
+    async with hanging_up(0, authority.issue_cert("127.0.0.1")) as fence:
+        url = f"tcp://127.0.0.1:{fence.port}?ca={ca}"
+
+        async def reopen() -> Any:
+            return await open_transport(url, arm="magician")
+
+        link = Link(await reopen(), Parser(), request, url=url, barriers=BARRIERS, reopen=reopen)
+        async with aclosing(link):
+            assert await link.request(c.GET_POSE, None) == POSE
+            fence.hang_ups = fence.calls + 2
+            link._transport._transport.abort()  # type: ignore[attr-defined]
+            async for state in link.state:
+                if state is LinkState.OPEN and link.outages:
+                    break
+
+            assert await link.request(c.GET_POSE, None) == POSE
+            assert fence.calls == fence.hang_ups + 1
+
+
+async def test_tls_round_trip_and_a_certificate_that_is_not_trusted(authority: trustme.CA, ca: Path) -> None:
+    async with hanging_up(0, authority.issue_cert("127.0.0.1")) as fence:
+        async with linked(f"tcp://127.0.0.1:{fence.port}?ca={ca}") as link:
+            assert await link.request(c.GET_POSE, None) == POSE
+
+        with pytest.raises(ConnectFailed, match="CERTIFICATE_VERIFY_FAILED"):
+            await open_transport(f"tcp://127.0.0.1:{fence.port}?ca=system", arm="magician")
+
+
 # UDP
 
 
@@ -318,7 +426,7 @@ async def test_a_lost_datagram_is_mended_by_the_repetition() -> None:
         await peer.answer()
         await peer.answer(bytes(POSE_REPLY))
         assert await call == POSE
-        assert link.stats.repeated == 1
+        assert link.stats.sent == 2
 
 
 async def test_over_udp_one_request_is_under_way_at_a_time() -> None:

@@ -60,6 +60,6 @@ async def test_what_arrives_is_passed_on_and_the_limits_are_one() -> None:
     paced = Paced(near, GAP)
     await far.send(b"hello")
     assert await paced.receive() == b"hello"
-    assert (paced.in_flight, paced.window, paced.disorder) == (1, 1, near.disorder)
+    assert (paced.in_flight, paced.window, paced.reorder_window) == (1, 1, near.reorder_window)
     await paced.aclose()
     await far.aclose()

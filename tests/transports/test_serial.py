@@ -15,9 +15,9 @@ import anyio
 import pytest
 import serial
 
+from dobot_async._core.link.link import Link
 from dobot_async.contract import LinkState
 from dobot_async.errors import ConnectFailed, ConnectionLost
-from dobot_async.link import Link
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import Frame, Parser, request
 from dobot_async.transports import open_transport
@@ -29,6 +29,7 @@ if sys.platform == "win32":
 import termios
 import tty
 
+BARRIERS = [request(row, b"", queued=False) for row in (c.GET_POSE, c.GET_ALARMS_STATE)]
 BUFFER = 1 << 16
 
 
@@ -112,7 +113,7 @@ async def in_time() -> AsyncIterator[None]:
 async def linked(terminal: Terminal) -> AsyncIterator[Link[Frame]]:
     """A link to the terminal."""
     transport = await open_transport(terminal.url, arm="magician")
-    async with aclosing(Link(transport, Parser(), request, url=terminal.url)) as link:
+    async with aclosing(Link(transport, Parser(), request, url=terminal.url, barriers=BARRIERS)) as link:
         yield link
 
 

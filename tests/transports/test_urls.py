@@ -9,7 +9,10 @@ import serial
 
 from dobot_async import ConnectFailed
 from dobot_async.transports import SCHEMES, open_transport
-from dobot_async.transports.base import options
+from dobot_async.transports.base import number, options
+
+NO_TIMES = ("nan", "inf", "-inf", "-1", "-1e-9", "1e400", "", "1,5", "5ms", "1_0", "%201", "\u0661")
+SECONDS = "reorder_window=.*expected seconds, a number from 0 to 10"
 
 
 def refusal(url: str) -> str:
@@ -66,21 +69,37 @@ def test_a_url_without_a_scheme_of_ours_is_shown_all_schemes(url: str) -> None:
         ("udp://192.168.1.20:99999", "[Pp]ort out of range"),
         ("udp://192.168.1.20/path", "expected udp://host"),
         ("udp://[fe80::1", "Invalid IPv6 URL"),
-        ("udp://192.168.1.20?baud=1", "unknown option 'baud'; known: disorder, token"),
+        ("udp://192.168.1.20?baud=1", "unknown option 'baud'; known: reorder_window, token"),
         ("tcp://192.168.1.20:1?window=1", "unknown option 'window'"),
         ("serial:", "expected serial:///dev/ttyUSB0"),
         ("serial://", "expected serial:///dev/ttyUSB0"),
         ("serial://?baud=9600", "expected serial:///dev/ttyUSB0"),
-        ("serial:///dev/ttyUSB0?baud=0", "baud rate above 0"),
-        ("serial:///dev/ttyUSB0?baud=-9600", "baud rate above 0"),
-        ("serial:///dev/ttyUSB0?baud=fast", "baud='fast' is no int"),
-        ("serial:///dev/ttyUSB0?baud=", "baud='' is no int"),
-        ("serial:///dev/ttyUSB0?baud=9600.0", "baud='9600.0' is no int"),
+        ("serial:///dev/ttyUSB0?baud=0", "baud=.*expected bits per second, a whole number from 50 to 12000000"),
+        ("serial:///dev/ttyUSB0?baud=-9600", "baud=.*expected bits per second, a whole number from 50 to 12000000"),
+        ("serial:///dev/ttyUSB0?baud=fast", "baud='fast': expected bits per second"),
+        ("serial:///dev/ttyUSB0?baud=", "baud='': expected bits per second"),
+        ("serial:///dev/ttyUSB0?baud=9600.0", "baud='9600.0': expected bits per second"),
         ("serial:///dev/ttyUSB0?speed=9600", "unknown option 'speed'; known: baud"),
         ("serial:///dev/ttyUSB0?Baud=9600", "unknown option 'Baud'"),
         ("serial:///dev/ttyUSB0?baud", "'baud'"),
         ("serial:///dev/ttyUSB0?baud=9600&baud=115200", "option baud is given twice"),
         ("serial:///dev/ttyUSB0?&", "'&'|''"),
+        *(
+            (f"serial:///dev/ttyUSB0?baud={wrong}", "baud=.*bits per second")
+            for wrong in ("nan", "1e400", "9_600", "1" * 99)
+        ),
+        *((f"udp://10.0.0.1?reorder_window={wrong}", SECONDS) for wrong in (*NO_TIMES, "1e9", "10.1")),
+        *((f"ble://arm?pace={wrong}", "pace=.*seconds between two chunks") for wrong in (*NO_TIMES, "1.1")),
+        ("ble://arm?adapter=", "adapter=''.*hci1"),
+        ("ble://arm?adaptor=hci1", "unknown option 'adaptor'; known: pace, adapter"),
+        ("udp://10.0.0.1?disorder=0", "unknown option 'disorder'; known: reorder_window, token"),
+        ("tcp://10.0.0.1:1?ca=", "ca='': expected a PEM file, or system"),
+        ("wss://10.0.0.1:1?ca=", "ca='': expected a PEM file, or system"),
+        ("ws://10.0.0.1:1?ca=x", "unknown option 'ca'; known: token"),
+        ("tcp://10.0.0.1:1#x", "written %23"),
+        ("zenoh://arm?config=", "config='': expected a configuration file"),
+        ("zenoh://arm?connect=here", "connect='here': expected endpoints"),
+        ("zenoh://arm?lan=yes", "unknown option 'lan'; known: config, connect"),
     ],
 )
 def test_a_bad_url_names_what_is_wrong(url: str, wrong: str) -> None:
@@ -90,8 +109,16 @@ def test_a_bad_url_names_what_is_wrong(url: str, wrong: str) -> None:
         raise ValueError(message)
 
 
+@pytest.mark.parametrize("scheme", ["tcp", "udp", "ws", "wss"])
+@pytest.mark.parametrize("token", ["gar%20geheim", "geh%C3%BCheim", "", "gar#geheim"])
+def test_a_token_that_is_none_is_not_shown(scheme: str, token: str) -> None:
+    message = refusal(f"{scheme}://10.0.0.1:1?token={token}")
+    assert "geh" not in message
+    assert "token: expected a word" in message or "written %23" in message
+
+
 def test_options_are_converted() -> None:
-    found = options(urlsplit("serial:///dev/ttyUSB0?baud=9600"), {"baud": int})
+    found = options(urlsplit("serial:///dev/ttyUSB0?baud=9600"), {"baud": number(int, "bits", least=1, most=9600)})
     assert found == {"baud": 9600}
     assert options(urlsplit("serial:///dev/ttyUSB0"), {"baud": int}) == {}
 
