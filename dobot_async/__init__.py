@@ -23,8 +23,8 @@ HOMES = {
         "ReplyTimeout",
     ),
     "fleet.fleet": ("Fleet",),
-    "link": ("Link",),
-    "motion": ("Motion",),
+    "_core.link.link": ("Link",),
+    "_core.queue.motion": ("Motion",),
     "transports": ("open_transport",),
     "wire": ("Command",),
 }

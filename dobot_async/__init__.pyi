@@ -1,5 +1,7 @@
 # The names of __init__.py, for type checkers.
 
+from dobot_async._core.link.link import Link
+from dobot_async._core.queue.motion import Motion
 from dobot_async.contract import LinkState, LinkStats, Unexpected
 from dobot_async.discovery import DiscoveryProblem, Found, discover
 from dobot_async.errors import (
@@ -14,7 +16,6 @@ from dobot_async.errors import (
     ReplyTimeout,
 )
 from dobot_async.fleet.fleet import Fleet
-from dobot_async.link import Link
 from dobot_async.magician.alarms import Alarm
 from dobot_async.magician.arm import DeviceInfo, Jog, Magician
 from dobot_async.magician.effectors import Gripper, Laser, Pen, SuctionCup
@@ -29,7 +30,6 @@ from dobot_async.magician.params import (
     PTPMode,
     TriggerADCCondition,
 )
-from dobot_async.motion import Motion
 from dobot_async.mycobot.alarms import CobotAlarm
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.models import CobotModel

@@ -12,8 +12,8 @@ from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
+from dobot_async._core.link.link import Link
 from dobot_async.contract import Encoder, Frame, Parser
-from dobot_async.link import Link
 from dobot_async.transports import Transport
 
 __all__ = ["Bridged", "ByKey", "Kind", "Reading", "Watch"]
@@ -74,6 +74,10 @@ class Bridged(Protocol[F]):
     @property
     def filler(self) -> bytes:
         """Bytes that end a half frame that the arm waits for."""
+
+    @property
+    def barriers(self) -> Sequence[F]:
+        """Cheap reads that harm nobody, of several keys: an answer to one tells what will not be answered any more."""
 
     @property
     def greeting(self) -> F:

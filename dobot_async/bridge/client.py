@@ -19,12 +19,12 @@ from collections import deque
 from collections.abc import Callable, Hashable
 from typing import Any, Generic, TypeVar
 
+from dobot_async._core.link.admission import Admission
 from dobot_async.bridge.desk import Desk, Refused, Request
 from dobot_async.bridge.limits import Allowance, Limits
 from dobot_async.bridged import Bridged, Kind, Watch
 from dobot_async.contract import Frame
 from dobot_async.errors import DobotError
-from dobot_async.turns import Turns
 
 __all__ = ["Client"]
 
@@ -68,7 +68,7 @@ class Client(Generic[F]):
         self.left = False
         self.ordered = ordered
         self.watch: Watch[F] = family.watch()
-        self.reads = Turns(ON_THE_LINE)
+        self.reads = Admission(ON_THE_LINE)
         self._desk = desk
         self._family = family
         self._deliver = deliver

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Generic, TypeVar
 
+from dobot_async._core.link.link import Link
 from dobot_async.bridged import Bridged
 from dobot_async.contract import Frame
-from dobot_async.errors import ConnectionLost
-from dobot_async.link import Link
+from dobot_async.errors import ConnectionLost, ReplyTimeout
 
 __all__ = ["Line"]
 
@@ -28,15 +28,19 @@ class Line(Generic[F]):
     async def ask(self, frame: F, *, ready: Callable[[], None] = lambda: None, urgent: bool = False) -> F:
         """Sends a frame as often, and waits for its reply as long, as the family says; raises DobotError without one.
 
-        `ready` is called when it is about to be sent; what that raises is raised, and nothing sent.
+        `ready` is called whenever it is about to be sent; what that raises is raised, and nothing sent.
         """
         family = self._family
-        return await self._link.forward(
+        repeatable = family.repeatable(frame)
+        if urgent and not repeatable:
+            return await self._once(frame)
+
+        return await self._link.exchange(
             frame,
             partial(family.accept, frame),
             name=family.name(frame),
             timeout=family.patience(frame),
-            repeatable=family.repeatable(frame),
+            repeatable=repeatable,
             urgent=urgent,
             ready=ready,
         )
@@ -53,8 +57,23 @@ class Line(Generic[F]):
 
         return not isinstance(first, BaseException)
 
+    async def _once(self, frame: F) -> F:
+        """Sends what stops the arm at once and a single time: another one might end what its program has gone on to."""
+        patience = self._family.patience(frame)
+        problem = f"no answer to {self._family.name(frame)} from {self._link.url} within {patience:.3g} s"
+        try:
+            request = await self._link.send(frame, partial(self._family.accept, frame), timeout=patience)
+        except TimeoutError:
+            raise ReplyTimeout(problem) from None
+
+        if not await self._link.settle(request, patience):
+            raise ReplyTimeout(problem)
+
+        reply: F = request.value
+        return reply
+
     async def _urge(self, frame: F) -> F:
-        return await self._link.forward(
+        return await self._link.exchange(
             frame,
             partial(self._family.accept, frame),
             name=self._family.name(frame),

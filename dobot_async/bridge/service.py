@@ -22,6 +22,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, Literal, TypeVar
 
+from dobot_async._core.link.admission import Priority
+from dobot_async._core.link.link import Link
 from dobot_async.bridge.client import Client
 from dobot_async.bridge.desk import Refused, Request
 from dobot_async.bridge.lease import Lease
@@ -31,13 +33,12 @@ from dobot_async.bridged import Bridged, Kind
 from dobot_async.contract import Frame, LinkState
 from dobot_async.errors import ProtocolError, ReplyTimeout
 from dobot_async.events import Events
-from dobot_async.link import Link
 
 __all__ = ["Bridge", "BridgeEvent"]
 
 F = TypeVar("F", bound=Frame)
 logger = logging.getLogger("dobot_async.bridge")
-FAREWELL = 2.0
+FAREWELL = 1.5  # seconds: with the closing of the link that is 2, for who is cancelled
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +94,7 @@ class Bridge(Generic[F]):
         self._line = Line(link, family)
         self._lease = Lease(self._line, family, takeover=takeover, on_vanish=on_vanish, cut=self.cut, tell=self._tell)
         self._farewells: set[asyncio.Task[None]] = set()
-        link.stray = self._unasked
+        link.on_unsolicited.add(self._unasked)
         self._watching = asyncio.create_task(self._watch_link(), name="dobot_async bridge link")
 
     @property
@@ -216,11 +217,13 @@ class Bridge(Generic[F]):
         if request.kind is Kind.WRITE:
             return await self._write(client, request)
 
-        await client.reads.take(frame.key, 0)
+        if not client.reads.try_acquire(frame.key, Priority.IMMEDIATE):
+            await client.reads.acquire(frame.key, Priority.IMMEDIATE)
+
         try:
             return await self._line.ask(frame, ready=partial(client.sending, request))
         finally:
-            client.reads.give(frame.key)
+            client.reads.release(frame.key, Priority.IMMEDIATE)
 
     async def _stop(self, client: Client[F], frame: F) -> F:
         """Passes on what stops the arm; nothing that was to be written before it is sent after it."""

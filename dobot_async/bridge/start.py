@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+from dobot_async._core.link.link import Link
+from dobot_async._core.util.tasks import run_shielded
 from dobot_async.bridge.doors import Doors, open_doors
 from dobot_async.bridge.families import family_of
 from dobot_async.bridge.limits import Limits
@@ -15,8 +17,6 @@ from dobot_async.bridge.service import Bridge
 from dobot_async.bridged import Bridged
 from dobot_async.contract import Frame
 from dobot_async.errors import ConnectFailed, DobotError
-from dobot_async.link import Link
-from dobot_async.motion import undisturbed
 
 __all__ = ["bridge"]
 
@@ -84,7 +84,7 @@ async def bridge(
             denied={each for group in deny for each in known.denials[group]},
             limits=limits,
         )
-        stack.push_async_callback(lambda: undisturbed(running.aclose()))
+        stack.push_async_callback(lambda: run_shielded(running.aclose()))
         await greet(running.link, known, timeout)
         running.urls = await open_doors(doors, running, stack, running.turned_away)
         running.token = doors.token
@@ -98,7 +98,7 @@ async def linked(url: str, family: Bridged[F], timeout: float) -> Link[F]:
     # `ble:` may be any arm at first, but not another one later.
     again = partial(family.open, getattr(transport, "url", url), timeout)
     parser = family.parser()
-    link = Link(transport, parser, family.encode, url=url, filler=family.filler, reopen=again)
+    link = Link(transport, parser, family.encode, url=url, barriers=family.barriers, filler=family.filler, reopen=again)
     family.attach(link, parser)
     return link
 
@@ -107,7 +107,7 @@ async def greet(link: Link[F], family: Bridged[F], timeout: float) -> None:
     """Proves that an arm answers."""
     frame = family.greeting
     try:
-        await link.forward(
+        await link.exchange(
             frame, partial(family.accept, frame), name=family.name(frame), timeout=timeout, repeatable=True
         )
     except DobotError as error:

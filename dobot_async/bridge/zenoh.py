@@ -19,11 +19,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import SplitResult
 
+from dobot_async._core.util.tasks import run_shielded
 from dobot_async.bridge.limits import Allowance
 from dobot_async.bridge.service import Bridge
 from dobot_async.bridge.telemetry import Telemetry
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.tasks import whole
 from dobot_async.transports.zenoh_messages import DATA, END, Lost, Numbered, Outbox
 from dobot_async.transports.zenoh_place import Place, address, library
 from dobot_async.transports.zenoh_session import VERSION, Keys, Session
@@ -113,7 +113,7 @@ class Door:
         for guest in list(self._guests.values()):
             self.leave(guest, "the arm is not served any more")
 
-        await whole(self._end())
+        await run_shielded(self._end())
 
     def way(self, name: str, *, waits: bool) -> Callable[[bytes], None]:
         """Returns the way to a client."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import Any, TextIO, TypeVar
 import anyio
 import click
 
+from dobot_async._core.util.tasks import run_shielded
 from dobot_async.cli.cell_program import execute, parse_cell_program
 from dobot_async.cli.output import Output
 from dobot_async.cli.params import ABOVE_ZERO
@@ -249,12 +250,15 @@ async def observe(cell: Cell, rate: float, count: int | None, show: Callable[[Ma
         for task in tasks:
             task.cancel()
 
-        with anyio.CancelScope(shield=True):
-            await asyncio.wait(tasks)
-
+        await run_shielded(joined(tasks))
         for task in tasks:
             if not task.cancelled():
                 task.result()
+
+
+async def joined(tasks: Collection[asyncio.Task[None]]) -> None:
+    """Returns when tasks have ended, however that is."""
+    await asyncio.wait(tasks)
 
 
 async def follow(member: Member[Any], interval: float, note: Callable[[Reading], None]) -> None:

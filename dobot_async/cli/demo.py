@@ -19,12 +19,12 @@ import anyio
 import click
 from click.core import ParameterSource
 
+from dobot_async._core.queue.motion import Motion
 from dobot_async.cli.output import joint_words, tool_words
 from dobot_async.cli.params import ABOVE_ZERO
 from dobot_async.cli.session import Session, run
 from dobot_async.magician.arm import Magician
 from dobot_async.magician.params import Pose, PTPMode
-from dobot_async.motion import Motion
 
 __all__ = ["demo"]
 
@@ -136,7 +136,7 @@ class Work:
                 batch.wait(GRIP)
                 last = batch.move_to(*place, UP, mode=LINE)
 
-        self.motions.extend(batch.motions.values())
+        self.motions.extend(batch.motions)
         return last
 
 

@@ -10,6 +10,7 @@ Exit codes:
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -36,6 +37,7 @@ from dobot_async.errors import DobotError
 __all__ = ["cli"]
 
 FAILED = 1
+SILENT = logging.NullHandler()
 OUTPUT_CLOSED = 141  # what a shell reports of a program that SIGPIPE ended
 
 
@@ -48,7 +50,7 @@ class Group(click.Group):
             return super().invoke(ctx)
         except Interrupted as interrupted:
             if ctx.obj.commanding:
-                click.echo("interrupted; the arm was told to stop", err=True)
+                click.echo("; ".join(["interrupted; the arm was told to stop", *interrupted.problems]), err=True)
 
             ctx.exit(128 + interrupted.number)
         except (KeyboardInterrupt, click.Abort):
@@ -84,6 +86,8 @@ def cli(ctx: click.Context, url: str | None, arm: str, as_json: bool, trace: str
 
     Exit codes: 0 done, 1 the arm or the link failed, 2 wrong usage, 130 Ctrl-C. Ctrl-C stops the arm first.
     """
+    # What is of interest is told in one line at the end; without a handler Python writes warnings to standard error.
+    logging.getLogger("dobot_async").addHandler(SILENT)
     ctx.obj = Session(url, arm, trace, Output(as_json))
 
 

@@ -20,6 +20,7 @@ from typing import Any, TextIO, TypeVar
 
 import click
 
+from dobot_async._core.queue.motion import Motion
 from dobot_async.cli.commands import ON_OFF
 from dobot_async.cli.families import MODES
 from dobot_async.cli.session import Session
@@ -27,13 +28,13 @@ from dobot_async.errors import ArmAlarm, DobotError
 from dobot_async.magician.arm import Magician
 from dobot_async.magician.params import IOFunction, PTPMode
 from dobot_async.magician.verbs import Verbs
-from dobot_async.motion import Motion
 from dobot_async.wire import Command
 
 __all__ = ["Step", "parse", "run_program"]
 
 Q = TypeVar("Q")
 Reader = Callable[[str], Any]
+STANDS_WITHIN = 1.5  # seconds for which one waits, after an alarm, to hear which motion it has ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,12 +259,12 @@ async def execute(arm: Magician, steps: Sequence[Step], report: Callable[[int], 
 async def ended_at(steps: Sequence[Step], motions: Sequence[Motion], error: DobotError) -> Step:
     """Returns the first step that is known to have failed; if there is none, the one that was to be sent next.
 
-    An alarm ends all Motions, but who waits for room may hear of it before they do.
+    An alarm ends all Motions, but of those that the arm ticked off before it that is known only once the arm stands.
     """
     for step, motion in zip(steps, motions, strict=False):
-        if motion.done or isinstance(error, ArmAlarm):
+        if motion.ended or isinstance(error, ArmAlarm):
             try:
-                await motion
+                await motion.wait(STANDS_WITHIN)
             except DobotError:
                 return step
 

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Sequence
 from contextlib import asynccontextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
 import click
 
+from dobot_async._core.link.link import Link
 from dobot_async.cli.families import FAMILIES, Family
 from dobot_async.cli.output import Output
 from dobot_async.cli.trace import Trace, tracing
-from dobot_async.link import Link
 from dobot_async.transports import SCHEMES
 
 __all__ = ["ARMS", "Interrupted", "Session", "run"]
@@ -34,11 +34,17 @@ SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if 
 
 
 class Interrupted(Exception):
-    """A signal ended the work, and everything was closed; `number` is the signal's."""
+    """A signal ended the work, and everything was closed.
 
-    def __init__(self, number: int) -> None:
+    Attributes:
+        number: The signal's.
+        problems: What went wrong on the way out, such as an arm that did not acknowledge its stop.
+    """
+
+    def __init__(self, number: int, problems: Sequence[str]) -> None:
         super().__init__(number)
         self.number = number
+        self.problems = problems
 
 
 @dataclass(slots=True)
@@ -113,7 +119,7 @@ def traced(kind: Any, trace: Trace) -> Any:
     class Traced(kind):  # type: ignore[misc]
         def __init__(self, link: Link[Any], **options: Any) -> None:
             super().__init__(link, **options)
-            link.trace = trace
+            link.on_frame.add(trace)
 
     return Traced
 
@@ -150,7 +156,7 @@ def run(work: Coroutine[Any, Any, T]) -> T:
         return asyncio.run(cancellable())
     except BaseException as error:
         if received:
-            raise Interrupted(received[0]) from None
+            raise Interrupted(received[0], getattr(error, "__notes__", ())) from None
 
         if isinstance(error, ValueError):
             raise click.UsageError(str(error)) from error

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Collection, Mapping
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from typing import Any, Generic, Literal, Self, TypeVar
 
+from dobot_async._core.util.tasks import run_shielded
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.barriers import Barriers
 from dobot_async.fleet.claims import Party
 from dobot_async.fleet.seat import Member, Seat, tell_to_stop
 from dobot_async.fleet.shapes import Shape
-from dobot_async.fleet.work import end, named
+from dobot_async.fleet.work import ended, named, on_the_way_out
 from dobot_async.fleet.zones import Zones
-from dobot_async.motion import undisturbed
 
 __all__ = ["Crew", "OnFailure"]
 
@@ -46,7 +46,7 @@ class Crew(Generic[A]):
         self._seats = {
             name: Seat(name, member, self._zones, self._fail, self._works) for name, member in members.items()
         }
-        self._stopping: set[asyncio.Task[None]] = set()
+        self._stopping: dict[asyncio.Task[None], Seat] = {}
         self._leaving = False
 
     @asynccontextmanager
@@ -55,30 +55,27 @@ class Crew(Generic[A]):
         leave = asyncio.Event()
         ready = {name: asyncio.get_running_loop().create_future() for name in self._seats}
         hosts = {
-            asyncio.create_task(host(seat, options, ready[name], leave), name=f"dobot_async {name}")
+            asyncio.create_task(host(seat, options, ready[name], leave), name=f"dobot_async {name}"): name
             for name, seat in self._seats.items()
         }
         try:
             await all_ready(hosts, ready.values())
             yield self
-        except BaseException:
+        except BaseException as error:
             self._leaving = True
-            await undisturbed(self._close(hosts, stop=True))
+            tell_to_stop(seat for seat in self._seats.values() if seat.stops_on_error)
+            await on_the_way_out(error, ended(hosts))
             raise
 
         self._leaving = True
-        await undisturbed(self._stopped())
+        await run_shielded(self._left(hosts, leave))
+
+    async def _left(self, hosts: Collection[asyncio.Task[None]], leave: asyncio.Event) -> None:
+        """Leaves all arms; those that a failure has stopped get time to hear of it."""
+        await self._stops_heard()
         leave.set()
-        await undisturbed(self._close(hosts, stop=False))
-
-    async def _close(self, hosts: set[asyncio.Task[None]], *, stop: bool) -> None:
-        """Joins all that the fleet has started; with `stop` the arms are left as by an error."""
-        if stop:
-            await end(hosts)
-
-        await self._stopped()
         await asyncio.wait(hosts)
-        for task in hosts if not stop else ():
+        for task in hosts:
             task.result()
 
     def _seat(self, name: str) -> Seat:
@@ -102,6 +99,10 @@ class Crew(Generic[A]):
         alone = name in self._seats and len(self._affected(name)) < len(self._seats)
         return not (alone and isinstance(error, DobotError))
 
+    def _causes(self, error: BaseException) -> Collection[str]:
+        """The arms through whose failures others were stopped."""
+        return self.failures if isinstance(error, MotionStopped) else ()
+
     def _fail(self, failed: Seat, error: DobotError) -> None:
         """An arm has failed: the others stop, and nobody waits for it any more."""
         if self._leaving:
@@ -123,11 +124,12 @@ class Crew(Generic[A]):
             if seat.arm is None:
                 continue
 
-            seat.queue.fail(seat.stopped)
+            if seat.commands:
+                task = seat.begin_stop(seat.stopped)
+                self._stopping[task] = seat
+                task.add_done_callback(self._stopping.pop)
+
             self._zones.claims.fail([seat.party], seat.stopped)
-            task = asyncio.create_task(self._halt(seat), name=f"dobot_async {seat.name} stop")
-            self._stopping.add(task)
-            task.add_done_callback(self._stopping.discard)
 
     def _works(self, seat: Seat) -> None:
         """An arm may move, whatever it has failed with before."""
@@ -136,24 +138,31 @@ class Crew(Generic[A]):
             self._barriers.join(seat.name)
             del self.failures[seat.name]
 
-    async def _halt(self, seat: Seat) -> None:
-        """Stops one arm, as far as its link allows."""
-        with suppress(DobotError):
-            await undisturbed(seat.arm.stop())
+    @asynccontextmanager
+    async def _stopping_others(self) -> AsyncIterator[None]:
+        """When this is left, the arms that a failure has stopped have heard of it, or had their time to."""
+        try:
+            yield
+        except BaseException as error:
+            await on_the_way_out(error, self._stops_heard())
+            raise
 
-    async def _stopped(self) -> None:
-        """Returns when the stops that a failure has begun are over."""
-        if self._stopping:
-            await asyncio.wait(self._stopping)
+        await run_shielded(self._stops_heard())
+
+    async def _stops_heard(self) -> list[str]:
+        """Waits for the stops that a failure has begun; returns of which arms it is not known whether they stand."""
+        heard = await asyncio.gather(*(seat.stop_heard(task) for task, seat in self._stopping.items()))
+        return [problem for problem in heard if problem]
 
 
 async def host(seat: Seat, options: Mapping[str, Any], ready: asyncio.Future[None], leave: asyncio.Event) -> None:
     """Holds one arm's connection until all are to be left; cancelled, it leaves it as by an error."""
     member = seat.member
     try:
-        async with seat.family.kind.connect(member.url, **{**options, **member.options}) as arm:
+        options = {**options, **member.options}
+        async with seat.family.kind.connect(member.url, **options) as arm:
             try:
-                await seat.begin(arm)
+                await seat.begin(arm, options)
                 ready.set_result(None)
                 await leave.wait()
             finally:
@@ -162,7 +171,7 @@ async def host(seat: Seat, options: Mapping[str, Any], ready: asyncio.Future[Non
         named(seat.name, error)
         raise
     finally:
-        await undisturbed(seat.aclose())
+        await run_shielded(seat.aclose())
 
 
 async def all_ready(hosts: Collection[asyncio.Task[None]], ready: Collection[asyncio.Future[None]]) -> None:

@@ -8,19 +8,21 @@ A family is one of `FAMILIES`.
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
+from dobot_async._core.queue.motion import Motion
+from dobot_async._core.queue.queue import MotionQueue
+from dobot_async._core.util.arguments import check_timeout
+from dobot_async._core.util.hooks import Hooks
 from dobot_async.errors import DobotError
-from dobot_async.executor import Entry
 from dobot_async.families import Each
 from dobot_async.fleet.frames import Place
 from dobot_async.magician import commands as magician
 from dobot_async.magician.arm import Jog, Magician
 from dobot_async.magician.queue import Batch, MagicianQueue
-from dobot_async.motion import Motion, MotionQueue
 from dobot_async.mycobot import commands as mycobot
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.queue import CobotBatch, CobotQueue
@@ -38,10 +40,8 @@ PLENTY = 1000
 class Overseer(Protocol):
     """What a queue of the fleet reports to."""
 
-    def admitted(
-        self, batch: Mapping[Entry, Motion], timeout: float | None
-    ) -> AbstractAsyncContextManager[float | None]:
-        """While this is entered, a batch may be sent; raises if it may not be. Yields the seconds that are left."""
+    def admitted(self, motions: Sequence[Motion], timeout: float | None) -> AbstractAsyncContextManager[float | None]:
+        """While this is entered, motions may be sent; raises if they may not be. Yields the seconds that are left."""
 
     def roaming(self) -> AbstractAsyncContextManager[None]:
         """While this is entered, the arm may go anywhere; raises if it may not."""
@@ -59,21 +59,21 @@ class FleetQueue(MotionQueue):
 
     overseer: Overseer | None = None
 
-    async def put_all(self, batch: Mapping[Entry, Motion], *, timeout: float | None = None) -> None:
+    async def put_all(self, motions: Sequence[Motion], *, timeout: float | None = None) -> None:
         """Gives several commands to the arm's queue once the fleet allows them; see `MotionQueue.put_all`."""
         if self.overseer is None:
-            await super().put_all(batch, timeout=timeout)
+            await super().put_all(motions, timeout=timeout)
             return
 
-        async with self.overseer.admitted(batch, timeout) as left:
-            await super().put_all(batch, timeout=left)
+        async with self.overseer.admitted(motions, check_timeout(timeout)) as left:
+            await super().put_all(motions, timeout=left)
 
-    def fail(self, error: DobotError) -> None:
-        """Ends all Motions with an error, and tells the fleet."""
+    def fail(self, error: DobotError, *, spare: Sequence[Motion] = ()) -> None:
+        """Ends all Motions with an error, and tells the fleet; see `MotionQueue.fail`."""
         if self.overseer:
             self.overseer.ended(error)
 
-        super().fail(error)
+        super().fail(error, spare=spare)
 
     @asynccontextmanager
     async def roaming(self) -> AsyncIterator[None]:
@@ -103,6 +103,7 @@ class FleetMagician(Magician):
 
     def __init__(self, link: Any, **options: Any) -> None:
         super().__init__(link, **options)
+        self._executor.on_unknown = Hooks()  # it told the queue that this one replaces
         self.queue: FleetMagicianQueue = FleetMagicianQueue(self._executor)
 
     @asynccontextmanager
@@ -117,6 +118,7 @@ class FleetMyCobot(MyCobot):
 
     def __init__(self, link: Any, *arguments: Any, **options: Any) -> None:
         super().__init__(link, *arguments, **options)
+        self._executor.on_unknown = Hooks()
         self.queue: FleetCobotQueue = FleetCobotQueue(self._executor, self.model)
 
     @asynccontextmanager
@@ -131,6 +133,7 @@ class FleetUltraArm(UltraArm):
 
     def __init__(self, link: Any, **options: Any) -> None:
         super().__init__(link, **options)
+        self._executor.on_unknown = Hooks()
         self.queue: FleetUltraArmQueue = FleetUltraArmQueue(self._executor, self.pump)
 
     @asynccontextmanager
@@ -149,7 +152,7 @@ class Family:
         name: Its word in a cell file.
         kind: Its class in a fleet.
         batch: Makes an empty batch for a queue.
-        stop: The command that stops it and may be sent twice; None if its answer could pass for another one's.
+        stop: The command that stops it, is acknowledged, and may be sent twice; None if there is none.
         ask: A cheap question, for measuring how long an answer takes.
         place: Tells where the tool is.
         room: Tells how many commands the queue can take while it is paused.

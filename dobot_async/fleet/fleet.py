@@ -17,7 +17,9 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar, cast, overload
 
-from dobot_async.errors import DobotError
+from dobot_async._core.util.arguments import check_timeout
+from dobot_async._core.util.tasks import STAYING
+from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
 from dobot_async.fleet.cell import read_cell
 from dobot_async.fleet.claims import Party
 from dobot_async.fleet.crew import Crew, OnFailure
@@ -30,7 +32,6 @@ from dobot_async.fleet.work import all_of, named, side_by_side
 from dobot_async.fleet.zones import Program, Run, here, running
 from dobot_async.magician.arm import Magician
 from dobot_async.magician.queue import Batch
-from dobot_async.motion import undisturbed
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.queue import CobotBatch
 from dobot_async.ultraarm.arm import UltraArm
@@ -188,19 +189,31 @@ class Fleet(Crew[A]):
                 named(seat.name, error)
                 raise
 
-        try:
-            return await side_by_side({name: done(seat) for name, seat in self._seats.items()}, ends=self._ends)
-        finally:
-            await undisturbed(self._stopped())
+        async with self._stopping_others():
+            work = {name: done(seat) for name, seat in self._seats.items()}
+            return await side_by_side(work, ends=self._ends, causes=self._causes)
 
-    async def stop(self) -> None:
+    async def stop(self, *, timeout: float = STAYING) -> None:
         """Stops all arms, at the same time; pending Motions raise MotionStopped.
 
+        Args:
+            timeout: Seconds to wait for the arms to acknowledge it; it is repeated after that, too, and when this call
+                is cancelled, until each of them does or its connection ends.
+
         Raises:
+            ValueError: All arms are only looked at (control=False).
+            ReplyTimeout: An arm has not acknowledged it yet.
             DobotError: An arm could not be stopped; the others were.
         """
-        tell_to_stop(self._seats.values())
-        await undisturbed(all_of({name: seat.stop() for name, seat in self._seats.items()}))
+        within = check_timeout(timeout)
+        seats = [seat for seat in self._seats.values() if seat.commands]
+        if not seats:
+            raise ValueError("a stop is a command, and these connections only read (control=False)")
+
+        tell_to_stop(seats)
+        stops = {seat.name: seat.begin_stop(MotionStopped("the arm was told to stop")) for seat in seats}
+        await asyncio.wait(stops.values(), timeout=within)
+        await all_of({name: stopped(stop, timeout) for name, stop in stops.items()})
 
     async def recover(self) -> None:
         """Makes all arms ready again after a failure: clears alarms and queues, and lets them move.
@@ -213,7 +226,7 @@ class Fleet(Crew[A]):
             await (seat.arm.recover() if hasattr(seat.arm, "recover") else seat.queue.clear())
             await seat.locate()
 
-        await self._stopped()
+        await self._stops_heard()
         await all_of({name: recovered(seat) for name, seat in self._seats.items()})
         self._barriers.forget()
         for seat in self._seats.values():
@@ -251,11 +264,12 @@ class Fleet(Crew[A]):
             finally:
                 self._barriers.leave(name, f"{name} {why}", run=run)
 
-        try:
-            return await side_by_side({name: ran(name, each) for name, each in programs.items()}, ends=self._ends)
-        finally:
-            self._barriers.forget(run)
-            await undisturbed(self._stopped())
+        async with self._stopping_others():
+            try:
+                work = {name: ran(name, each) for name, each in programs.items()}
+                return await side_by_side(work, ends=self._ends, causes=self._causes)
+            finally:
+                self._barriers.forget(run)
 
     async def barrier(self, name: str, *parties: str, timeout: float | None = None) -> None:
         """Returns when all parties have come to this barrier; it may be passed any number of times.
@@ -348,3 +362,13 @@ class Fleet(Crew[A]):
             except BaseException:
                 abandon(batches)
                 raise
+
+
+async def stopped(stop: asyncio.Task[None], timeout: float) -> None:
+    """Raises what has become of a stop that had so many seconds, unless it was heard."""
+    if not stop.done():
+        raise ReplyTimeout(
+            f"the arm has not acknowledged within {timeout:.3g} s that it is to stop; this is repeated until it does"
+        )
+
+    stop.result()

@@ -12,13 +12,13 @@ from __future__ import annotations
 import asyncio
 import math
 from collections import deque
-from collections.abc import AsyncIterator, Iterable, Mapping
+from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import DobotError
-from dobot_async.executor import Entry
 from dobot_async.fleet.claims import Claim, Party
 from dobot_async.fleet.families import Family
 from dobot_async.fleet.frames import BaseFrame, Place
@@ -28,7 +28,6 @@ from dobot_async.fleet.zones import Zones, here
 from dobot_async.magician import commands as c
 from dobot_async.magician.arm import Magician
 from dobot_async.magician.kinematics import Joints
-from dobot_async.motion import Motion
 
 __all__ = ["Guard", "Mode", "Step"]
 
@@ -88,8 +87,8 @@ class Guard:
         self._plans = 0
         party.moving = lambda: bool(steps or self._roaming or self._looking)
 
-    async def admit(self, batch: Mapping[Entry, Motion], deadline: float | None) -> None:
-        """Returns when the arm may do a batch, and enters it.
+    async def admit(self, motions: Sequence[Motion], deadline: float | None) -> None:
+        """Returns when the arm may do what is to be sent together, and enters it.
 
         Raises:
             ValueError: It leads out of the limits of the arm, or where the arm cannot go.
@@ -97,15 +96,15 @@ class Guard:
             ZoneDeadlock: Waiting for it would never end.
             ReplyTimeout: Waiting took too long.
         """
-        moves = any(entry.command.moves for entry in batch)
+        moves = any(motion.moves for motion in motions)
         if moves and not self._located:
             self._forget()
             if not self._steps:
                 await self.locate()
 
         steps, joints = [], self._joints
-        for entry, motion in batch.items():
-            step, joints = await self._plan(entry, motion, joints)
+        for motion in motions:
+            step, joints = await self._plan(motion, joints)
             steps.append(step)
 
         zones = frozenset[str]().union(*(step.zones for step in steps))
@@ -200,7 +199,7 @@ class Guard:
 
     def _forget(self) -> None:
         """Drops steps that have failed; the arm may be anywhere on their way."""
-        while self._steps and self._steps[0].motion.done:
+        while self._steps and self._steps[0].motion.ended:
             self._standing |= self._steps.popleft().zones
 
     async def _read_joints(self) -> Joints | None:
@@ -211,17 +210,18 @@ class Guard:
         pose = await self._arm.get_pose()
         return Joints(pose.j1, pose.j2, pose.j3, pose.j4)
 
-    async def _plan(self, entry: Entry, motion: Motion, joints: Joints | None) -> tuple[Step, Joints | None]:
+    async def _plan(self, motion: Motion, joints: Joints | None) -> tuple[Step, Joints | None]:
         """What a command leads through, and the joints at its end; both of them as far as they are known."""
-        if isinstance(entry.value, (c.PTPJumpParams, c.PTPJump2Params)):
-            self._lifts.add(lift_of(entry.value))
+        value = motion.entry.value
+        if isinstance(value, (c.PTPJumpParams, c.PTPJump2Params)):
+            self._lifts.add(lift_of(value))
 
-        if not entry.command.moves:
+        if not motion.moves:
             return Step(motion), joints
 
         way = None
         if joints and isinstance(self._arm, Magician):
-            way = way_of(entry.value, joints, self._arm.kinematics, await self._lifts_for(entry.value))
+            way = way_of(value, joints, self._arm.kinematics, await self._lifts_for(value))
 
         if way is None:
             return Step(motion, self._anywhere(), None), None

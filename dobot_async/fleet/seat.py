@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Mapping
-from contextlib import ExitStack, asynccontextmanager, nullcontext, suppress
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from contextlib import asynccontextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 import anyio
 
+from dobot_async._core.queue.motion import Motion
 from dobot_async.contract import LinkState
-from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
-from dobot_async.executor import Entry
+from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout, another
 from dobot_async.fleet.claims import Party, Pause
 from dobot_async.fleet.families import Family, FleetQueue, family_of
 from dobot_async.fleet.frames import BaseFrame
@@ -21,7 +21,6 @@ from dobot_async.fleet.guard import Guard, Mode, Step
 from dobot_async.fleet.shapes import Box
 from dobot_async.fleet.work import named
 from dobot_async.fleet.zones import Zones, here
-from dobot_async.motion import Motion
 
 __all__ = ["Member", "Seat", "tell_to_stop"]
 
@@ -62,9 +61,9 @@ class Member(Generic[A]):
 
 
 def tell_to_stop(seats: Iterable[Seat]) -> None:
-    """Tells arms to stop before this returns: all of them before anything is noted of one. `stop` is to follow."""
-    for owed in [seat.shout() for seat in seats]:
-        owed()
+    """Tells arms to stop before this returns, as far as their links can; `begin_stop` of each is to follow."""
+    for seat in seats:
+        seat.tell_to_stop()
 
 
 class Seat:
@@ -77,6 +76,8 @@ class Seat:
         party: As what it holds zones.
         arm: The arm, once it is connected.
         stopped: Why it may not move; None while all is well.
+        commands: Whether it is connected to command it, not only to look on.
+        stops_on_error: Whether it stops when the fleet is left by an error.
     """
 
     def __init__(
@@ -93,6 +94,7 @@ class Seat:
         self.party = zones.arms[name]
         self.arm: Any = None
         self.stopped: DobotError | None = None
+        self.commands = self.stops_on_error = False
         self._zones = zones
         self._failed = failed
         self._works = works
@@ -102,7 +104,7 @@ class Seat:
         self._commanding: tuple[Party, ...] = ()
         self._halts = 0
         self._halted: DobotError = MotionStopped("the arm was stopped")
-        self._halting: tuple[Any, bytes] | None = None  # the frame that stops the arm, ready to be sent
+        self._halting: Any = None  # the frame that stops the arm, ready to be sent
         self._quiet = False
         self._tasks: set[asyncio.Task[None]] = set()
         self._follower: asyncio.Task[None] | None = None
@@ -114,13 +116,14 @@ class Seat:
         assert isinstance(queue, FleetQueue)
         return queue
 
-    async def begin(self, arm: Any) -> None:
-        """Takes an arm that was just connected."""
+    async def begin(self, arm: Any, options: Mapping[str, Any]) -> None:
+        """Takes an arm that was just connected, with these options."""
         self.arm = arm
         member = self.member
-        if self.family.stop and member.options.get("control", True):
-            frame = arm.link.frame(self.family.stop, None)
-            self._halting = frame, bytes(frame)
+        self.commands = options.get("control", True)
+        self.stops_on_error = self.commands and options.get("on_error", "stop") == "stop"
+        if self.family.stop and self.commands:
+            self._halting = arm.link.frame(self.family.stop, None)
 
         if member.guard != "off":
             self._guard = Guard(
@@ -152,15 +155,15 @@ class Seat:
         return set(self._tasks)
 
     @asynccontextmanager
-    async def admitted(self, batch: Mapping[Entry, Motion], timeout: float | None) -> AsyncIterator[float | None]:
-        """While this is entered, a batch may be sent. Yields the seconds that are left for it."""
+    async def admitted(self, motions: Sequence[Motion], timeout: float | None) -> AsyncIterator[float | None]:
+        """While this is entered, motions may be sent. Yields the seconds that are left for it."""
         loop = asyncio.get_running_loop()
         deadline = None if timeout is None else loop.time() + timeout
         try:
-            await self._admit(batch, deadline)
+            await self._admit(motions, deadline)
         except BaseException as error:
             reason = error if isinstance(error, DobotError) else MotionStopped(f"it was not sent: {error}")
-            for motion in batch.values():
+            for motion in motions:
                 motion.end(reason)
 
             raise
@@ -200,26 +203,26 @@ class Seat:
             raise MotionStopped(f"{self.stopped}; the fleet stays stopped until fleet.recover()")
 
         if halts is not None and halts != self._halts:
-            raise self._halted.with_traceback(None)
+            raise another(self._halted)
 
-    def shout(self) -> Callable[[], None]:
-        """Tells the arm to stop before this returns, if its link can; see `Link.shout`. `stop` is to follow at once."""
-        if self._halting is None:
-            return lambda: None
+    def tell_to_stop(self) -> None:
+        """Writes a stop before this returns, if the link can; nobody waits for its answer."""
+        if self._halting is not None:
+            with suppress(DobotError):  # of a link that is gone everybody hears otherwise
+                self.arm.link.send_nowait(self._halting)
 
-        owed: Callable[[], None] = self.arm.link.shout(*self._halting)
-        return owed
+    def begin_stop(self, error: DobotError) -> asyncio.Task[None]:
+        """Ends all Motions with an error; returns the task that tells the arm to stop until it has heard it."""
+        return self.queue.begin_stop(error)
 
-    def stop(self) -> Coroutine[Any, Any, None]:
-        """Returns what stops the arm; from now on none of its motions counts as done."""
-        stopping = ExitStack()
-        stopping.enter_context(self.queue.stopping(MotionStopped("the arm was stopped")))
+    async def stop_heard(self, stop: asyncio.Task[None]) -> str:
+        """Waits for what `begin_stop` has begun, for so long as one does on the way out of a block.
 
-        async def stop() -> None:
-            with stopping:
-                await self.arm.stop()
-
-        return stop()
+        Returns:
+            Why it is not known whether the arm stands, "" if it does.
+        """
+        failure = await self.arm.link.cleanup.finish(stop)
+        return f"{self.name}: it is not known whether the arm stands: {failure}" if failure else ""
 
     def quiet(self, quiet: bool) -> None:
         """Says whether the arm is to be left alone for now, although it has motions that nobody awaits."""
@@ -241,8 +244,8 @@ class Seat:
         if self._steps and not self._quiet and (self._follower is None or self._follower.done()):
             self._follower = self._spawn(self._follow(), "follower")
 
-    async def _admit(self, batch: Mapping[Entry, Motion], deadline: float | None) -> None:
-        """Takes the lock of the order, and returns when the batch may be sent."""
+    async def _admit(self, motions: Sequence[Motion], deadline: float | None) -> None:
+        """Takes the lock of the order, and returns when motions may be sent."""
         self.check()
         halts = self._halts
         try:
@@ -253,9 +256,9 @@ class Seat:
 
         try:
             if self._guard:
-                await self._guard.admit(batch, deadline)
+                await self._guard.admit(motions, deadline)
             else:
-                self._steps.extend(Step(motion) for motion in batch.values())
+                self._steps.extend(Step(motion) for motion in motions)
 
             self.check(halts)
         except BaseException:

@@ -11,17 +11,16 @@ from __future__ import annotations
 
 import asyncio
 import statistics
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
 from typing import Any, Generic, TypeVar
 
-from dobot_async.errors import DobotError, MotionStopped
-from dobot_async.fleet.seat import Seat
-from dobot_async.fleet.work import all_of, side_by_side
-from dobot_async.motion import undisturbed
+from dobot_async._core.queue.motion import Motion
+from dobot_async.errors import MotionStopped, another
+from dobot_async.fleet.seat import Seat, tell_to_stop
+from dobot_async.fleet.work import on_the_way_out, side_by_side
 
-__all__ = ["Start", "Together"]
+__all__ = ["Start", "Together", "abandon", "launch"]
 
 B = TypeVar("B")
 SAMPLES = 7
@@ -89,14 +88,14 @@ class Together(Generic[B]):
 
 async def wait_for(batch: Any) -> None:
     """Waits for all motions of a batch."""
-    for motion in list(batch.motions.values()):
+    for motion in list(batch.motions):
         await motion
 
 
 def abandon(batches: Mapping[str, Any]) -> None:
     """Ends the Motions of batches that were not sent."""
     for batch in batches.values():
-        for motion in batch.motions.values():
+        for motion in batch.motions:
             motion.end(MotionStopped("it was not sent: the block that starts the arms together was left by an error"))
 
 
@@ -111,6 +110,17 @@ async def launch(seats: Mapping[str, Seat], batches: Mapping[str, Any], timeout:
 
     await side_by_side({name: seat.queue.join(timeout) for name, seat in seats.items()})
     latency = await side_by_side({name: measure(seat) for name, seat in seats.items()})
+    try:
+        return await start(seats, batches, latency, timeout)
+    except BaseException as error:
+        await on_the_way_out(error, give_up(seats))
+        raise
+
+
+async def start(
+    seats: Mapping[str, Seat], batches: Mapping[str, Any], latency: Mapping[str, float], timeout: float | None
+) -> Start:
+    """Loads what the arms take while they are paused, starts them, and sends the rest."""
     for seat in seats.values():
         seat.quiet(True)
 
@@ -121,17 +131,14 @@ async def launch(seats: Mapping[str, Seat], batches: Mapping[str, Any], timeout:
         first, rest = {}, {}
         for name in seats:
             motions = batches[name].motions
-            first[name] = dict(islice(motions.items(), max(1, rooms.get(name, 1) - 1)))
-            rest[name] = dict(islice(motions.items(), len(first[name]), None))
+            loaded = max(1, rooms.get(name, 1) - 1)
+            first[name], rest[name] = motions[:loaded], motions[loaded:]
 
         await side_by_side({name: seat.queue.put_all(first[name], timeout=timeout) for name, seat in pausing.items()})
         instant = asyncio.get_running_loop().time() + LEAD + max(latency.values())
         told = await side_by_side(
             {name: release(seat, instant - latency[name], first[name]) for name, seat in seats.items()}
         )
-    except BaseException:
-        await undisturbed(give_up(seats))
-        raise
     finally:
         for seat in seats.values():
             seat.quiet(False)
@@ -159,7 +166,7 @@ async def measure(seat: Seat) -> float:
     return statistics.median(trips) / 2
 
 
-async def release(seat: Seat, when: float, motions: Mapping[Any, Any]) -> tuple[float, float]:
+async def release(seat: Seat, when: float, motions: Sequence[Motion]) -> tuple[float, float]:
     """Starts one arm at a time; returns when that was sent, and when it was answered."""
     loop = asyncio.get_running_loop()
     await asyncio.sleep(when - loop.time())
@@ -172,9 +179,14 @@ async def release(seat: Seat, when: float, motions: Mapping[Any, Any]) -> tuple[
     return sent, loop.time()
 
 
-async def give_up(seats: Mapping[str, Seat]) -> None:
-    """Stops arms that were to start, so that what was loaded does not run later."""
-    try:
-        await all_of({name: seat.arm.stop() for name, seat in seats.items()})
-    except DobotError:
-        return
+async def give_up(seats: Mapping[str, Seat]) -> list[str]:
+    """Stops arms that were to start, so that what was loaded does not run later.
+
+    Returns:
+        Of which arms it is not known whether they stand.
+    """
+    tell_to_stop(seats.values())
+    error = MotionStopped("the start of several arms together was given up")
+    stops = [(seat, seat.begin_stop(another(error))) for seat in seats.values()]
+    heard = await asyncio.gather(*(seat.stop_heard(stop) for seat, stop in stops))
+    return [problem for problem in heard if problem]

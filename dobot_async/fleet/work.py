@@ -6,14 +6,14 @@ All end before this returns. Of several failures one is told: the first of which
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Collection, Coroutine, Iterable, Mapping
 from typing import Any, TypeVar
 
+from dobot_async._core.util.tasks import LEAVING, join
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.errors import BarrierBroken
-from dobot_async.motion import undisturbed
 
-__all__ = ["all_of", "named", "side_by_side"]
+__all__ = ["all_of", "ended", "named", "on_the_way_out", "side_by_side"]
 
 T = TypeVar("T")
 CONSEQUENCES = (MotionStopped, BarrierBroken, asyncio.CancelledError)
@@ -23,33 +23,46 @@ async def side_by_side(
     work: Mapping[str, Coroutine[Any, Any, T]],
     *,
     ends: Callable[[str, BaseException], bool] = lambda _name, _error: True,
+    causes: Callable[[BaseException], Collection[str]] = lambda _error: (),
 ) -> dict[str, T]:
     """Does everything at the same time, and returns what each has returned.
 
     Args:
         work: By the arm's name.
         ends: Whether a failure cancels the others.
+        causes: Whose own failures a failure is a consequence of: they get a moment to hear of them.
 
     Raises:
-        BaseException: The first failure, when all have ended.
+        BaseException: The first failure, when all have ended; what went wrong while the others ended is a note on it.
     """
     tasks = {asyncio.create_task(each, name=f"dobot_async {name}"): name for name, each in work.items()}
-    waiting, failures = set(tasks), list[BaseException]()
+    waiting, failures = set(tasks), dict[str, BaseException]()
+    patience = None
     try:
         while waiting:
-            done, waiting = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+            done, waiting = await asyncio.wait(waiting, timeout=patience, return_when=asyncio.FIRST_COMPLETED)
+            if not done:
+                patience = None
+                cancel(waiting)
+
             for task, name in tasks.items():
                 error = failure(task) if task in done else None
                 if error:
-                    failures.append(error)
+                    failures[name] = error
                     if ends(name, error):
-                        cancel(waiting)
-    except BaseException:
-        await undisturbed(end(waiting))
+                        spared = {each for each in waiting if tasks[each] in causes(error)}
+                        cancel(waiting - spared)
+                        patience = LEAVING if spared else None
+    except BaseException as error:
+        await on_the_way_out(error, ended({task: tasks[task] for task in waiting}))
         raise
 
     if failures:
-        raise min(failures, key=lambda error: isinstance(error, CONSEQUENCES))
+        first = min(failures.values(), key=lambda error: isinstance(error, CONSEQUENCES))
+        for note in notes(failures, but=first):
+            first.add_note(note)
+
+        raise first
 
     return {name: task.result() for task, name in tasks.items()}
 
@@ -74,21 +87,52 @@ def named(name: str, error: BaseException) -> BaseException:
 
 
 def failure(task: asyncio.Task[Any]) -> BaseException | None:
-    """How a task that has ended failed, if it did."""
-    return asyncio.CancelledError() if task.cancelled() else task.exception()
+    """How a task that has ended failed, if it did; a cancellation has its notes when it is asked for first."""
+    try:
+        return task.exception()
+    except asyncio.CancelledError as error:
+        return error
 
 
-def cancel(tasks: set[asyncio.Task[Any]]) -> None:
+def cancel(tasks: Collection[asyncio.Task[Any]]) -> None:
     """Cancels all."""
     for task in tasks:
         task.cancel()
 
 
-async def end(tasks: set[asyncio.Task[Any]]) -> None:
-    """Cancels all, and waits for their end, however it is."""
+async def ended(tasks: Mapping[asyncio.Task[Any], str]) -> list[str]:
+    """Cancels all, waits for their end, and returns what went wrong meanwhile, by the names of their arms."""
     cancel(tasks)
     if tasks:
         await asyncio.wait(tasks)
 
-    for task in tasks:
-        failure(task)  # asyncio complains of one that nobody looks at
+    return notes({name: error for task, name in tasks.items() if (error := failure(task))})
+
+
+def notes(failures: Mapping[str, BaseException], *, but: BaseException | None = None) -> list[str]:
+    """What went wrong while work was cancelled, by the names of the arms."""
+    cancelled = {
+        name: error
+        for name, error in failures.items()
+        if isinstance(error, asyncio.CancelledError) and error is not but
+    }
+    return [
+        note if note.startswith(f"{name}: ") else f"{name}: {note}"
+        for name, error in cancelled.items()
+        for note in getattr(error, "__notes__", ())
+    ]
+
+
+async def on_the_way_out(error: BaseException, work: Coroutine[Any, Any, Iterable[str]]) -> None:
+    """Runs work to its end before an error goes on; what it returns is noted on that.
+
+    Raises:
+        CancelledError: The caller was cancelled meanwhile, and the error was none.
+    """
+    task = asyncio.create_task(work)
+    cancelled = await join(task)
+    for note in task.result():
+        error.add_note(note)
+
+    if cancelled and not isinstance(error, asyncio.CancelledError):
+        raise cancelled

@@ -13,7 +13,7 @@ from contextlib import asynccontextmanager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 
-from dobot_async.errors import DobotError, ReplyTimeout
+from dobot_async.errors import DobotError, ReplyTimeout, another
 from dobot_async.fleet.claims import Claim, Claims, Party
 from dobot_async.fleet.shapes import Shape
 
@@ -170,7 +170,7 @@ class Zones:
             raise
 
         if error:
-            raise error
+            raise another(error)  # a failure may answer several claims
 
         return claim
 

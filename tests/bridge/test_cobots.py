@@ -59,7 +59,7 @@ async def bridged(
         async with bridge(sim.url, listen=listen, family=model, **details) as running:
             happened: list[BridgeEvent] = []
             sent: list[f.Frame] = []
-            running.link.trace = lambda outgoing, frame: sent.append(frame) if outgoing else None
+            running.link.on_frame.add(lambda outgoing, frame: sent.append(frame) if outgoing else None)
 
             async def note() -> None:
                 async for event in running.events:

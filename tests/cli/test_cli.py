@@ -9,6 +9,7 @@ import re
 import signal
 import sys
 import threading
+import time
 from asyncio.subprocess import PIPE, Process
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
@@ -29,6 +30,7 @@ MODULE = (sys.executable, "-W", "error", "-m", "dobot_async")
 POSE_KEYS = ["x", "y", "z", "r", "j1", "j2", "j3", "j4"]
 LONG_PROGRAM = "\n".join(f"move 200 {-60 if line % 2 else 60} 50" for line in range(200))
 FAST = 50.0
+ON_A_DEAD_LINE = 3.0  # seconds: two, and the end of the interpreter
 
 
 class Done(NamedTuple):
@@ -374,6 +376,21 @@ async def test_a_signal_stops_the_arm(number: signal.Signals, code: int) -> None
         assert done.errors == "interrupted; the arm was told to stop\n"
         assert sim.arm.device.idle
         assert "aborted" in [each.outcome for each in sim.arm.executed]
+
+
+async def test_ctrl_c_ends_in_time_on_a_dead_line_and_says_what_is_not_known() -> None:
+    async with simulate(listen="tcp://127.0.0.1:0") as sim:
+        process = await start("--url", sim.url, "move", "200", "60", "50")
+        await until_moving(sim)
+        sim.faults.loss = 1.0
+        began = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        done = await finish(process)
+        assert time.monotonic() - began < ON_A_DEAD_LINE
+        assert (done.code, done.output) == (130, "")
+        assert done.errors.count("\n") == 1
+        assert done.errors.startswith("interrupted; the arm was told to stop; ")
+        assert "it is not known whether the arm stands" in done.errors
 
 
 async def test_an_impatient_ctrl_c_stops_the_arm_all_the_same() -> None:

@@ -89,7 +89,7 @@ async def test_json_is_one_object_and_discover_lists_the_arm(sim: Simulation) ->
         (("sim:",), 2, "--name"),
         (("--name", "a/b", "sim:"), 2, "expected zenoh://name"),
         (("--name", "left", "--lan", "--listen", "tcp/127.0.0.1:0", "sim:"), 2, "--lan"),
-        (("--name", "left", "--listen", "nonsense", "sim:"), 2, "no endpoints"),
+        (("--name", "left", "--listen", "nonsense", "sim:"), 2, "expected endpoints"),
         (("--name", "left", "--zenoh", "missing.json5", "sim:"), 2, "missing.json5"),
         (("--name", "left", "--connect", "tcp/127.0.0.1:1", "sim:"), 1, "Zenoh cannot be started"),
         (("--name", "left", "tcp://127.0.0.1:1"), 1, "cannot reach"),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
+from typing import Any
 
 import pytest
 from virtual import virtual
@@ -176,7 +177,7 @@ async def test_a_stop_is_on_every_line_before_anything_is_awaited() -> None:
         stop = asyncio.create_task(fleet.stop())
         await asyncio.sleep(0)
         assert [sim.arm.executed[-1].outcome for sim in sims.values()] == ["aborted", "aborted"]
-        assert not any(motion.done for motion in motions)
+        assert all(motion.done for motion in motions)
         await stop
         for motion in motions:
             with pytest.raises(MotionStopped):
@@ -207,7 +208,7 @@ async def test_what_a_stop_makes_the_arm_tick_off_is_not_done() -> None:
     async with cell("left", speed=1) as sims, Fleet.connect(urls(sims)) as fleet:
         arm = fleet["left"]
         motion = await arm.queue.wait(600)
-        with arm.queue.stopping(MotionStopped("now")):
+        with arm.queue.stopping():
             await arm.request(c.SET_QUEUED_CMD_FORCE_STOP_EXEC, None)
             await arm.queue.update()
             assert not motion.done
@@ -291,12 +292,12 @@ async def test_a_lost_link_is_noticed_although_nobody_asks() -> None:
 async def test_a_link_that_is_lost_before_its_arm_has_its_seat_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     begin = Seat.begin
 
-    async def begin_too_late(seat: Seat, arm: Magician) -> None:
+    async def begin_too_late(seat: Seat, arm: Magician, options: Mapping[str, Any]) -> None:
         if seat.name == "left":
             sims["left"].unplug()
             await anext(aiter(arm.link.state))
 
-        await begin(seat, arm)
+        await begin(seat, arm, options)
 
     monkeypatch.setattr(Seat, "begin", begin_too_late)
     async with cell("left", "right") as sims, Fleet.connect(urls(sims)) as fleet:
@@ -466,8 +467,8 @@ async def test_a_run_ends_all_when_one_fails() -> None:
 async def test_an_alarm_while_the_fleet_is_being_left() -> None:
     async with cell("left", "right") as sims:
         async with Fleet.connect(urls(sims)) as fleet:
-            await fleet["left"].queue.move_to(*TOO_FAR)
             await fleet["right"].queue.wait(600)
+            await fleet["left"].queue.move_to(*TOO_FAR)
 
         await asyncio.sleep(1)
         assert sims["left"].arm.executed[-1].command is c.SET_PTP_CMD

@@ -1,0 +1,75 @@
+"""The end of a lease: nobody else may write before the arm was seen to stand, several times in a row."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from virtual import virtual
+
+from dobot_async.bridge.lease import Lease
+from dobot_async.mycobot import commands as c
+from dobot_async.mycobot.bridged import BRIDGED, CobotWatch
+from dobot_async.mycobot.frame import Frame
+from dobot_async.mycobot.models import MODELS
+
+MODEL = MODELS["mycobot280"]
+
+
+class FakeLine:
+    """The way to an arm that moves until it hears a stop, of which some are lost; and some looks are spoilt.
+
+    Attributes:
+        moving: Whether the arm moves.
+    """
+
+    def __init__(self, spoilt: Sequence[int], lost: int) -> None:
+        self.moving = True
+        self._spoilt = spoilt
+        self._lost = lost
+        self._looks = 0
+
+    async def ask(self, _: Frame) -> Frame:
+        """Answers whether it moves; a spoilt answer says that it stands."""
+        await asyncio.sleep(0.02)
+        self._looks += 1
+        return Frame(c.IS_MOVING.id, bytes([self.moving and self._looks - 1 not in self._spoilt]))
+
+    async def stop(self, _: Sequence[Frame]) -> bool:
+        """Stops the arm, if that is not lost on the way; it is never acknowledged."""
+        await asyncio.sleep(1)
+        self._lost -= 1
+        self.moving = self.moving and self._lost >= 0
+        return False
+
+
+@pytest.mark.parametrize("lost", [0, 1, 3])
+@pytest.mark.parametrize("spoilt", [[], [0], [1], [0, 1], [1, 2], [0, 1, 3, 4]], ids=str)
+@virtual
+async def test_an_arm_that_seems_to_stand_for_a_moment_is_stopped_before_the_lease_ends(
+    spoilt: list[int], lost: int
+) -> None:
+    now = 0.0
+    line: Any = FakeLine(spoilt, lost)
+    told: list[tuple[str, bool]] = []
+    lease: Lease[Frame] = Lease(
+        line,
+        BRIDGED["mycobot280"],
+        takeover=False,
+        on_vanish="stop",
+        cut=lambda *_: None,
+        tell=lambda what, *_: told.append((what, line.moving)),
+    )
+    first: Any = SimpleNamespace(gone=False, name="first", watch=CobotWatch(MODEL, lambda: now))
+    second: Any = SimpleNamespace(gone=False, name="second", watch=CobotWatch(MODEL, lambda: now))
+    await lease.take(first)
+    first.watch.sent(Frame(c.SEND_ANGLES.id, b""))
+    now = 60.0  # the motion has long begun
+    first.gone = True
+    await asyncio.gather(lease.end(first), lease.take(second))
+    assert not line.moving
+    assert told == [("lease", True), ("stopped", False), ("released", False), ("lease", False)]
+    assert lease.holder is second
