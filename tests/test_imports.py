@@ -1,6 +1,6 @@
 """The way of the imports, read from the source: layers know nothing of higher ones, and families not of each other.
 
-errors <- wire, pending, ... <- transports <- link <- motion <- families <- discovery <- simulator <- cli <- __main__
+errors <- wire, util <- transports <- link <- queue <- arms <- families <- discovery <- simulator <- cli <- __main__
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -21,12 +21,11 @@ ROOT = Path(dobot_async.__file__).parent
 FAMILIES = tuple(REGISTERED)
 LAYERS = (
     ("errors", "families"),
-    ("wire", "events", "pending", "turns", "roundtrip"),
-    ("layouts", "executor", "transports", "contract", "posted"),
-    ("asking",),
-    ("link", "hosted", "rows"),
-    ("motion", "bridged"),
-    ("family",),
+    ("wire", "events", "_core.util"),
+    ("layouts", "transports", "contract"),
+    ("_core.link", "rows"),
+    ("_core.queue", "bridged"),
+    ("arms",),
     FAMILIES,
     ("discovery", "fleet"),
     ("simulator", "bridge"),
@@ -39,8 +38,13 @@ SOURCES = sorted(ROOT.rglob("*.py"))
 
 def top(path: Path) -> str:
     """The module, or the subpackage, that a file belongs to; "" for the package's own `__init__`."""
-    name = path.relative_to(ROOT).parts[0].removesuffix(".py")
-    return "" if name == "__init__" else name
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return "" if parts[0] == "__init__" else layer_name(parts)
+
+
+def layer_name(parts: Sequence[str]) -> str:
+    """What a module is called in `LAYERS`: the packages of the core are layers of their own."""
+    return ".".join(parts[: 2 if parts[0] == "_core" else 1])
 
 
 def imports(path: Path) -> Iterator[str]:
@@ -66,9 +70,9 @@ def own_imports(path: Path) -> set[str]:
     for name in imports(path):
         head, _, rest = name.partition(".")
         if head == PACKAGE:
-            part = rest.split(".")[0]
-            is_module = (ROOT / part).is_dir() or (ROOT / f"{part}.py").is_file()
-            found.add(part if is_module else "")
+            parts = rest.split(".")
+            is_module = (ROOT / parts[0]).is_dir() or (ROOT / f"{parts[0]}.py").is_file()
+            found.add(layer_name(parts) if is_module else "")
 
     return found
 
@@ -92,12 +96,12 @@ def test_imports_go_down(path: Path) -> None:
 
 
 def test_every_module_has_its_layer() -> None:
-    assert {top(path) for path in SOURCES} - {""} <= LAYER.keys()
+    assert {top(path) for path in SOURCES} - {"", "_core.__init__"} <= LAYER.keys()
 
 
 def test_the_layers_are_seen_at_all() -> None:
-    assert own_imports(ROOT / "link.py") >= {"errors", "pending", "transports"}
-    assert own_imports(ROOT / "magician" / "arm.py") >= {"link", "motion", "magician"}
+    assert own_imports(ROOT / "_core" / "link" / "link.py") >= {"errors", "_core.util", "transports"}
+    assert own_imports(ROOT / "magician" / "arm.py") >= {"_core.link", "arms", "magician"}
 
 
 def test_modules_are_named_as_strings_by_the_transports_the_package_and_the_register_of_families_alone() -> None:

@@ -22,9 +22,9 @@ from dobot_async import (
     ReplyTimeout,
     UltraArm,
 )
+from dobot_async._core.queue.queue import MotionQueue
 from dobot_async.contract import LinkState
 from dobot_async.magician import commands as magician
-from dobot_async.motion import MotionQueue
 from dobot_async.mycobot import commands as mycobot
 from dobot_async.simulator import Faults, simulate
 from dobot_async.ultraarm import commands as ultraarm
@@ -221,7 +221,7 @@ async def test_what_cannot_be_opened_in_time_tells_why_and_not_the_token(
             error.add_note(f"there is no way to a {arm}")
             raise
 
-    monkeypatch.setattr("dobot_async.family.open_transport", never)
+    monkeypatch.setattr("dobot_async.arms.session.open_transport", never)
     with pytest.raises(ConnectFailed, match=r"token=\.\.\. could not be opened within .*no way to a") as failed:
         async with family.connect("tcp://host:1?token=secret", timeout=0.01):
             pass

@@ -39,7 +39,7 @@ PTY_OPTIONS = {"baud": int}
 FAULT_OPTIONS = dict.fromkeys((*PROBABILITIES, *TIMES, *MEANS), float)
 SILENCE = 1.0  # seconds after which a client that cannot be seen to leave counts as another one
 BUFFER = 1 << 16
-LEAST_DISORDER = 0.005
+LEAST_REORDER_WINDOW = 0.005
 
 names = itertools.count(1)
 running: WeakValueDictionary[str, Simulation] = WeakValueDictionary()
@@ -308,16 +308,16 @@ class MemoryTransport:
     def __init__(self, simulation: Simulation, stack: AsyncExitStack | None = None) -> None:
         self._simulation = simulation
         self._stack = stack
-        self.in_flight, self.window = (1, 1) if self.disorder else (MANY, 16)
+        self.in_flight, self.window = (1, 1) if self.reorder_window else (MANY, 16)
         self._arriving, self._arrived = anyio.create_memory_object_stream[bytes](BUFFER)
-        self._client = simulation.client(self._deliver, self._arriving.close, ordered=not self.disorder)
+        self._client = simulation.client(self._deliver, self._arriving.close, ordered=not self.reorder_window)
 
     @property
-    def disorder(self) -> float:
+    def reorder_window(self) -> float:
         """With jitter, overtaking or doubled messages it is a line for datagrams."""
         faults = self._simulation.faults
-        disorder = faults.jitter + faults.reorder
-        return max(disorder, LEAST_DISORDER) if disorder or faults.dup else 0.0
+        reorder_window = faults.jitter + faults.reorder
+        return max(reorder_window, LEAST_REORDER_WINDOW) if reorder_window or faults.dup else 0.0
 
     async def send(self, data: bytes) -> None:
         """Puts a request on the line."""

@@ -34,6 +34,17 @@ INTERNAL = frozenset(
         "connect",  # the two rows "connect" and "leaving" are it
         "exclusively",
         "fail",
+        "greet",  # what connect does with an arm
+        "leave",
+        "begin_stop",  # what the arms and the poller do with the queue
+        "cancel_writer",
+        "give_up",
+        "look",
+        "rest",
+        "watch",
+        "no_more_room",
+        "write_on",
+        "writer_ended",
         "perform",
         "prepare",
         "put_all",

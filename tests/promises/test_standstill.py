@@ -31,7 +31,7 @@ EVERYTHING = os.environ.get("PROMISES") == "all"
 SEEDS, QUICK, BLOCK = 1000, 240, 10
 STANDS_WITHIN = 1.0
 LEAVING = 2.0  # seconds that leaving a block may take
-MARGIN = 0.4  # of these, in which a stop that is on its way at the end need not arrive any more
+MARGIN = 0.5  # of these, in which a stop that is on its way at the end need not arrive any more
 STOPPING = 1.0  # seconds after which a user has had enough of waiting for a stop
 
 

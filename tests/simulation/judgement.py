@@ -20,8 +20,8 @@ from calls import Call, Violation
 from observed import Observed
 
 from dobot_async import ArmAlarm, ConnectionLost, DobotError, MotionStopped, MotionUnknown, ReplyTimeout
+from dobot_async._core.queue.motion import Motion
 from dobot_async.magician import commands as c
-from dobot_async.motion import Motion
 from dobot_async.simulator import Simulation
 from dobot_async.simulator.work import Executed
 
@@ -148,7 +148,7 @@ def judge(record: Record, seen: Observed, sim: Simulation, plan: Plan) -> None:
 def judge_answer(call: Call, row: Any, value: Any, seen: Observed, plan: Plan) -> None:
     """Raises Violation unless a read got what the arm has said, after it was asked, and in the time that it had."""
     begun, ended = call.begun or 0.0, call.ended or 0.0
-    if call.good and not seen.answered(row, value, call.value, begun - 2 * plan.disorder - TINY, ended + TINY):
+    if call.good and not seen.answered(row, value, call.value, begun - 2 * plan.reorder_window - TINY, ended + TINY):
         when = [time for time, each in seen.answers[row.id, value] if each == call.value and time <= ended]
         last = f"last made at {when[-1]:.4f}" if when else "never made"
         raise Violation(f"an answer from before its question ({last}): {call}")
@@ -202,11 +202,14 @@ def check_failure(
 
     if isinstance(error, MotionUnknown):
         excused = seen.silent(begun - LINGERING, ended, UNHEARD) or (plan.doubles and "step" in plan.kinds)
+        # Nothing can tell a command from a probe, where both are lost and the arm has no index yet.
+        excused = excused or (plan.loses and seen.has_no_index(begun - LINGERING, ended))
         ensure(excused, f"unknown without a silence: {error!r}: {what}")
     elif isinstance(error, ReplyTimeout):
         lost = plan.loses and ended - begun >= BRIEF
         own = timeout is not None and timeout < BRIEF and ended - begun >= timeout - 2 * TINY
-        excused = own or lost or seen.silent(begun - SHORT, ended, SHORT)
+        broken = seen.silent(begun - SHORT, ended, SHORT) or seen.broken(begun - SHORT, ended) >= SHORT
+        excused = own or lost or broken
         ensure(excused, f"no answer on a line that carries them: {error!r}: {what}")
     elif isinstance(error, ArmAlarm):
         ensure("far" in plan.kinds, f"no alarm was there: {error!r}: {what}")

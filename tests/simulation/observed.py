@@ -62,6 +62,15 @@ class Observed:
         silences = [*self.silences, *([(self._waiting_since, self.clock())] if self._waiting_since is not None else [])]
         return any(since < end and until > start and until - since >= least for since, until in silences)
 
+    def has_no_index(self, start: float, end: float) -> bool:
+        """Whether the arm told nonsense for the index of its last finished command."""
+        answers = self.answers[c.GET_QUEUED_CMD_CURRENT_INDEX.id, None]
+        return any(start <= time <= end and index >= 1 << 63 for time, index in answers)
+
+    def broken(self, start: float, end: float) -> float:
+        """For how many seconds of a time the line carried nothing."""
+        return sum(max(0.0, min(end, ended) - max(start, begun)) for begun, ended in self.sim.outages)
+
     def answered(self, row: Any, value: Any, answer: Any, start: float, end: float) -> bool:
         """Whether the arm made this answer to this question in this time."""
         return any(start <= time <= end and each == answer for time, each in self.answers[row.id, value])

@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import signal
 from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from random import Random
 from types import FrameType
@@ -91,7 +91,7 @@ class Plan:
     steps: int
     doubles: bool
     loses: bool
-    disorder: float
+    reorder_window: float
 
     @classmethod
     def of(cls, random: Random) -> Plan:
@@ -327,7 +327,7 @@ class Run:
     async def end(self) -> None:
         """Waits for all that was begun, then moves once more."""
         # A pause that was cancelled must not overtake the last resume.
-        good = self.seen.good_from(self.now, 2 * self.plan.disorder)
+        good = self.seen.good_from(self.now, 2 * self.plan.reorder_window)
         await self.impatient(good)
         await asyncio.sleep(good - self.now)
         for row, values in self.plan.reads:
@@ -363,6 +363,9 @@ class Run:
 
     async def last_moves(self) -> None:
         """What a cancelled put has left behind nobody waits for; the next command brings it to light."""
+        with suppress(DobotError):
+            await self.arm.queue.join()  # tells of failures that were judged when they happened
+
         for _ in range(3):
             call = await self.call("wait 0", self.last_wait, how="plain")
             if call.good:

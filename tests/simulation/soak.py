@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import gc
+import logging
 import os
 import sys
 import time
@@ -52,6 +53,7 @@ def scenario(of: str) -> Any:
 def run(seed: int, of: str) -> Result:
     """Runs a seed; returns why it failed, or an empty text, and its figures."""
     warnings.simplefilter("ignore")
+    logging.getLogger("dobot_async").setLevel(logging.CRITICAL + 1)
     try:
         return seed, "", asdict(scenario(of).run_seed(seed))
     except KeyboardInterrupt:

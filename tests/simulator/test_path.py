@@ -211,6 +211,20 @@ def test_a_line_through_the_base_ends_where_the_reach_ends() -> None:
     assert code_of(lambda: SOLVER.inverse((x, y + 0.01, z, r))) == 0x12
 
 
+@pytest.mark.parametrize("begin", range(-220, -140, 5))
+def test_a_line_that_leaves_the_reach_for_a_moment_raises_the_alarm(begin: int) -> None:
+    """It passes too near to the base for 2 cm, wherever along the line they lie, and both of its ends are in reach."""
+    device, now = device_at(109.5, begin, 0, 0)
+    target = (109.5, 200, 0, 0)
+    assert at(*target)
+    assert code_of(lambda: at(109.5, 0, 0, 0)) == 0x12
+    device.put(Work("line", lambda device: travel([leg_to(*target, start=device.joints)]), moves=True))
+    now[0] = 60.0
+    assert [each.outcome for each in device.executed] == ["alarm"]
+    assert 0x22 in device.alarms
+    assert SOLVER.forward(device.joints) == pytest.approx((109.5, -10, 0, 0), abs=0.2), "it ends where the reach ends"
+
+
 def test_an_arc_that_swings_too_far_out() -> None:
     wide = Solver(Kinematics(limits=JointLimits(j3=(-90, 90), fold=(-90, 180))))
     start = wide.inverse((250, 0, 0, 0))
