@@ -3,13 +3,14 @@
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make format    what ruff can mend
 # make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell]
+# make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all check pytest format clean fuzz soak
+.PHONY: demo test test-all check pytest format clean fuzz promises soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
@@ -45,6 +46,12 @@ OF ?= arm
 
 soak: $(VENV)/.dev
 	$(BIN)/python tests/simulation/soak.py --of $(OF) --seeds $(SEEDS) --first $(FIRST)
+
+ANSWERS ?= 200000
+
+promises: $(VENV)/.dev
+	PROMISES=all $(BIN)/python -m pytest -n auto tests/promises
+	$(BIN)/python -W ignore tests/promises/stale.py --answers $(ANSWERS)
 
 # Guided by coverage if the extra `fuzz` (atheris) is installed.
 SECONDS ?= 60
