@@ -191,6 +191,6 @@ class ByKey(ABC, Generic[F]):
         """Returns False."""
         return False
 
-    def refusal(self, reason: str) -> bytes:  # noqa: ARG002 - there is no word for it
+    def refusal(self, reason: str) -> bytes:  # noqa: ARG002 - the protocol has no refusal
         """Returns nothing."""
         return b""
