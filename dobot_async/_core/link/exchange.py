@@ -138,14 +138,16 @@ class Exchange(Connection, Generic[F]):
         request: Request[F] | None = None
         with suppress(ReplyTimeout):
             while True:
-                await self._clear(frame.key, deadline)
+                if self._correlator.newest(frame.key):
+                    await self._clear(frame.key, deadline)
+
                 left = self._left(deadline)
                 if not left:
                     break
 
                 ready()
                 self._stats.repeated += request is not None
-                held = not self._correlator.reorder_window and self._stragglers.suspected(frame.key, self._loop.time())
+                held = self._stragglers.suspected(frame.key, self._loop.time()) and not self._correlator.reorder_window
                 request = await self.send(frame, accept, timeout=left, held=held)
                 if held:
                     await self._send_barrier(frame.key, deadline)
@@ -235,10 +237,11 @@ class Exchange(Connection, Generic[F]):
 
     async def _wait(self, until: float, *requests: Request[F]) -> None:
         """Return when one of several requests has ended, or at a time."""
-        if any(request.outcome for request in requests):
-            return
+        for request in requests:
+            if request.outcome:
+                return
 
-        ended: asyncio.Future[None] = self._loop.create_future()
+        ended = self._loop.create_future()
         wake = partial(release, ended)
         timer = self._loop.call_at(until, wake)
         for request in requests:
