@@ -8,10 +8,10 @@ from typing import Any, Protocol, TypeVar
 
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
-from dobot_async.errors import ArmAlarm, MotionUnknown
+from dobot_async.errors import ArmAlarm, DobotError, MotionUnknown, ReplyTimeout
 from dobot_async.wire import Command
 
-__all__ = ["Entry", "Executor", "Source", "alarmed"]
+__all__ = ["Entry", "Executor", "Source", "alarmed", "unseen"]
 
 Q = TypeVar("Q")
 
@@ -103,3 +103,11 @@ class Executor(Protocol):
 def alarmed(alarms: Sequence[object]) -> ArmAlarm:
     """What to raise because of alarms."""
     return ArmAlarm(f"the arm raised alarms: {'; '.join(map(str, alarms))}", alarms)
+
+
+def unseen(error: DobotError) -> DobotError:
+    """What an error means to Motions: an arm that does not answer may do them, or not."""
+    if isinstance(error, ReplyTimeout):
+        return MotionUnknown(f"the arm no longer answers, and what it does cannot be seen: {error}")
+
+    return error
