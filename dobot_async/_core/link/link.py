@@ -230,6 +230,7 @@ class Link(Exchange[F]):
     def _ended(self, error: ConnectionLost) -> None:
         """Tell everybody who waits."""
         self._correlator.fail(error)
+        self._deadlines.close()
         if self.state.value is LinkState.LOST:
             logger.warning("%s", error)
             self.on_lost(error)
