@@ -256,6 +256,7 @@ class Link(Exchange[F]):
             self._note(False, frame)
             if not self._correlator.resolve(frame):
                 self._stats.unexpected += 1
+                self._stragglers.came(frame.key, self._arrived_at)
                 self.on_unsolicited(frame)
                 self.events.publish(Unexpected(frame))
 
