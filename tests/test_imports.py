@@ -24,7 +24,7 @@ LAYERS = (
     ("wire", "events", "_core.util"),
     ("layouts", "transports", "contract"),
     ("_core.link", "rows"),
-    ("_core.queue", "bridged"),
+    ("_core.queue", "bridged", "program"),
     ("arms",),
     FAMILIES,
     ("discovery", "fleet"),

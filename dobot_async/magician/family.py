@@ -28,4 +28,5 @@ FAMILY = Family(
     discovery="dobot_async.discovery.families:MAGICIAN",
     cli="dobot_async.cli.families:MAGICIAN",
     fleet="dobot_async.fleet.families:MAGICIAN",
+    program="dobot_async.magician.vocabulary:VOCABULARY",
 )

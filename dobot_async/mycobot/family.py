@@ -20,4 +20,5 @@ FAMILY = Family(
     discovery="dobot_async.discovery.families:MYCOBOT",
     cli="dobot_async.cli.cobots:COBOTS",
     fleet="dobot_async.fleet.families:MYCOBOT",
+    program="dobot_async.mycobot.vocabulary:VOCABULARIES",
 )

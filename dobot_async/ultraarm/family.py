@@ -16,4 +16,5 @@ FAMILY = Family(
     discovery="dobot_async.discovery.families:ULTRAARM",
     cli="dobot_async.cli.families:ULTRAARM",
     fleet="dobot_async.fleet.families:ULTRAARM",
+    program="dobot_async.ultraarm.vocabulary:VOCABULARY",
 )
