@@ -9,7 +9,8 @@
 
 Line numbers (N10) and checksums (*71) count for nothing, nor do G17, G21, G40, G49, G80 and G94, which say what is so
 anyway. F is mm/s, as the arm has it, not mm/min. What the arm has no command for is an error, and so is what asks it
-something. A program begins in absolute coordinates, and leaves the arm in them.
+something, a letter twice in one command, and a comment that is not closed in its line. A % stands alone on its line. A
+program begins in absolute coordinates, and leaves the arm in them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import AsyncIterator, Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,9 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import DobotError, MotionStopped, ProtocolError
+from dobot_async.program.step import ProgramError
+from dobot_async.program.step import Step as GCodeLine
+from dobot_async.program.text import lines_in, read_text, shortened
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.frame import split_words
 from dobot_async.ultraarm.layouts import Words
@@ -33,32 +38,14 @@ from dobot_async.wire import Command, Queueing
 __all__ = ["GCodeLine", "GCodeRun", "Source", "parse_gcode"]
 
 Source = str | os.PathLike[str] | Iterable[str]
-COMMENT = re.compile(r"\([^)]*\)|;.*|%|\*\d+\s*$")
+CHECKSUM = re.compile(r"\*\d+$")
+BEGINNING = re.compile(r"[(;]")
+IN_NUMBERS = "0123456789."
 EXPONENT = re.compile(r"\de[-+]?\d")
 IGNORED = {"G17", "G21", "G40", "G49", "G80", "G94"}
 ENDING = {"M2", "M30"}
 AXES = ("x", "y", "z", "e")
 MOVING = "XYZEF"
-
-
-@dataclass(frozen=True, slots=True)
-class GCodeLine:
-    """One command of a program, checked.
-
-    Attributes:
-        number: Of its line, from 1; 0 for what the program did not ask for itself.
-        text: Of its line.
-        command: The row of the table.
-        value: Its parameters.
-    """
-
-    number: int
-    text: str
-    command: Command[Any, Any]
-    value: Any
-
-    def __str__(self) -> str:
-        return f"line {self.number} ({self.text})"
 
 
 def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> tuple[GCodeLine, ...]:
@@ -69,25 +56,25 @@ def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> t
         limits: What the arm may be told. Increments are looked at where it is known from where.
 
     Raises:
-        ValueError: Lines are wrong; the message has each with its number.
+        ProgramError: Lines are wrong; the message has each with its number.
+        ValueError: The file is not UTF-8 text.
         OSError: The file cannot be read.
     """
     reader = Reader(limits)
     found: list[GCodeLine] = []
     wrong = []
     for number, written in enumerate(lines_of(source), 1):
-        text = COMMENT.sub(" ", written).strip()
         try:
-            for command, value in reader.read(text):
+            for command, value in reader.read(bare(written)):
                 found.append(GCodeLine(number, written.strip(), command, value))
         except (ValueError, TypeError, ProtocolError) as error:
-            wrong.append(f"line {number}: {error}")
+            wrong.append((number, str(error)))
 
         if reader.ended:
             break
 
     if wrong:
-        raise ValueError("\n".join(wrong))
+        raise ProgramError(wrong)
 
     return tuple(found)
 
@@ -95,9 +82,36 @@ def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> t
 def lines_of(source: Source) -> Iterable[str]:
     """Return the lines of a program."""
     if isinstance(source, (str, os.PathLike)):
-        return Path(source).read_text(encoding="utf-8-sig").splitlines()
+        return lines_in(read_text(Path(source)))
 
     return source
+
+
+def bare(line: str) -> str:
+    """Return a line without its comments and its checksum; raise ValueError where they are not closed, or in a number."""
+    line = line.strip()
+    if line == "%":
+        return ""
+
+    if "\n" in line or "\r" in line:
+        raise ValueError(f"{shortened(line)!r} has a line break in it")
+
+    pieces, at = [], 0
+    while (begins := BEGINNING.search(line, at)) and begins[0] == "(":
+        ends = line.find(")", begins.end())
+        if ends < 0:
+            raise ValueError("a comment that begins with ( ends with ) in the same line")
+
+        pieces.append(line[at : begins.start()].strip())
+        at = ends + 1
+
+    pieces.append(line[at : begins.start() if begins else None].strip())
+    pieces = [piece for piece in pieces if piece]
+    for before, after in pairwise(pieces):
+        if before[-1] in IN_NUMBERS and after[0] in IN_NUMBERS:
+            raise ValueError("there is a comment in the middle of a number")
+
+    return CHECKSUM.sub("", " ".join(pieces)).strip()
 
 
 class Reader:
@@ -141,12 +155,12 @@ class Reader:
     def _groups(self, text: str) -> Iterator[tuple[str, list[str]]]:
         """Yield the commands of a line, each with its own words."""
         if EXPONENT.search(text):
-            raise ValueError(f"{text!r} has an exponent, which the arm would read as its fourth axis")
+            raise ValueError(f"{shortened(text)!r} has an exponent, which the arm would read as its fourth axis")
 
         try:
             words = split_words(text.encode("ascii"))
         except ValueError:
-            raise ValueError(f"{text!r} is no G-code") from None
+            raise ValueError(f"{shortened(text)!r} is no G-code") from None
 
         groups: list[tuple[str, list[str]]] = []
         for letter, number in words:
@@ -156,6 +170,9 @@ class Reader:
             if letter in "GM" and not (groups and letter in letters_of(groups[-1][0])):
                 groups.append((f"{letter}{int(number)}" if number.isdigit() else letter + number, []))
             elif groups:
+                if any(word[0] == letter for word in groups[-1][1]):
+                    raise ValueError(f"{letter} stands twice in one command")
+
                 groups[-1][1].append(letter + number)
             elif letter in MOVING and self._moves:
                 groups.append(("G0", [letter + number]))
