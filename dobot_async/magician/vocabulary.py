@@ -108,9 +108,10 @@ class CheckedVerbs(Verbs[Result]):
         return None
 
 
-def declare_rail(verbs: CheckedVerbs, *on: bool, version: c.AccessoryVersion = c.AccessoryVersion.V1) -> Result:
+def declare_rail(verbs: CheckedVerbs, *states: bool, version: c.AccessoryVersion = c.AccessoryVersion.V1) -> Result:
     """Say whether the arm stands on a rail."""
-    return verbs.perform(c.SET_DEVICE_WITH_L, c.DeviceWithL(*on, version), None)
+    (on,) = states
+    return verbs.perform(c.SET_DEVICE_WITH_L, c.DeviceWithL(on, version), None)
 
 
 def declare_tool(verbs: CheckedVerbs, *tools: c.EndEffectorParams, **biases: float) -> Result:

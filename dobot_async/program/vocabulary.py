@@ -156,7 +156,9 @@ class Reader:
         verbs = self._vocabulary.verbs
         verb = verbs.get(name)
         if verb is None:
-            raise ValueError(f"no verb {shortened(name)!r} for the {self._vocabulary.arm}; there are: {', '.join(verbs)}")
+            raise ValueError(
+                f"no verb {shortened(name)!r} for the {self._vocabulary.arm}; there are: {', '.join(verbs)}"
+            )
 
         given = [word for word in words if "=" not in word]
         if not verb.needed <= len(given) <= len(verb.arguments):

@@ -88,7 +88,7 @@ def lines_of(source: Source) -> Iterable[str]:
 
 
 def bare(line: str) -> str:
-    """Return a line without its comments and its checksum; raise ValueError where they are not closed, or in a number."""
+    """Return a line without comments and checksum; raise ValueError where a comment cannot be told from the rest."""
     line = line.strip()
     if line == "%":
         return ""

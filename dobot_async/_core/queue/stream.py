@@ -229,4 +229,5 @@ def name_of(step: Any, number: int) -> str:
     if isinstance(step, Coroutine):
         return f"step {number}"
 
-    return f"step {number} ({step.command.name})" if type(step).__str__ is object.__str__ else str(step)
+    says_so = any("__str__" in vars(kind) for kind in type(step).__mro__[:-1])
+    return str(step) if says_so else f"step {number} ({step.command.name})"
