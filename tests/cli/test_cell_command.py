@@ -133,17 +133,64 @@ async def test_run(file: Path, arms: dict[str, Simulation], tmp_path: Path) -> N
     assert places(arms["right"]) == [(200, -120), (250, 0)]
 
 
-@pytest.mark.parametrize(("line", "code"), [("joints 0 120 0 0", 1), ("move 200 -120 600", 2)])
 async def test_run_tells_the_line_of_a_failure_and_stops_all(
-    file: Path, arms: dict[str, Simulation], tmp_path: Path, line: str, code: int
+    file: Path, arms: dict[str, Simulation], tmp_path: Path
 ) -> None:
     program = tmp_path / "program.txt"
-    program.write_text(f"right: wait 600\nleft: move 200 -120 20\nleft: {line}\n", encoding="utf-8")
-    ended, _, errors = await run("cell", file, "run", program)
-    assert ended == code
-    assert errors.splitlines()[-1].lower().startswith("error: left")
-    assert f"line 3 ({line}): " in errors
+    program.write_text("right: wait 600\nthird: wait 600\nleft: wait 0.1\nleft: by 0 0 600\n", encoding="utf-8")
+    file.write_text(file.read_text(encoding="utf-8").replace('guard = "wait"', ""), encoding="utf-8")
+    code, _, errors = await run("cell", file, "run", program)
+    assert code == 1
+    assert errors.count("\n") == 1
+    assert errors.startswith("error: left, line 4 (by 0 0 600): left: the arm raised alarms: ")
     assert [name for name, sim in arms.items() if sim.arm.device.executing] == []
+
+
+async def test_what_the_guard_refuses_under_way_is_a_failure_and_not_wrong_usage(
+    file: Path, arms: dict[str, Simulation], tmp_path: Path
+) -> None:
+    program = tmp_path / "program.txt"
+    program.write_text("left: move 200 -180 20\nleft: wait 0.01\nleft: move 200 180 20\n", encoding="utf-8")
+    limits = 'guard = "wait"\nlimits = { x = [190, 265] }'
+    file.write_text(file.read_text(encoding="utf-8").replace('guard = "wait"', limits, 1), encoding="utf-8")
+    code, _, errors = await run("cell", file, "run", program)
+    assert (code, errors.count("\n")) == (1, 1)
+    assert errors.startswith("error: left, line 3 (move 200 180 20): ")
+
+
+@pytest.mark.parametrize(
+    ("lines", "number"),
+    [
+        (["left: move 200 0 50", "left: fly", "right: home"], 2),
+        (["left: home", "third: suction on", "third: move 900 0 0"], 3),
+        (["*: home", "*: joints 1 2"], 2),
+        (["left: move 200 0 50", "right: move 200 0 600"], 2),
+        (["left: move 200 0 50", "left: by 0 0 400"], 2),
+        (["left: move 200 0 50 l=100"], 1),
+        (["left: wait 1", "left: leave bin"], 2),
+        (["left: wait 1", "left: tool pen"], 2),
+    ],
+    ids=str,
+)
+async def test_a_wrong_line_is_one_line_of_errors_and_nothing_is_sent_to_any_arm(
+    file: Path, arms: dict[str, Simulation], tmp_path: Path, lines: list[str], number: int
+) -> None:
+    program = tmp_path / "program.txt"
+    program.write_text("\n".join(lines), encoding="utf-8")
+    code, output, errors = await run("--json", "cell", file, "run", program)
+    assert (code, output) == (2, "")
+    assert errors.count("\n") == 1
+    assert errors.startswith(f"error: {program}: line {number}: ")
+    assert [sim.arm.counters.requests for sim in arms.values()] == [0, 0]
+
+
+async def test_dry_run_sends_nothing(file: Path, arms: dict[str, Simulation], tmp_path: Path) -> None:
+    program = tmp_path / "program.txt"
+    program.write_text(PROGRAM, encoding="utf-8")
+    code, output, errors = await run("--json", "cell", file, "run", program, "--dry-run")
+    assert (code, errors) == (0, "")
+    assert json.loads(output)["sent"] is False
+    assert [sim.arm.counters.requests for sim in arms.values()] == [0, 0]
 
 
 async def test_ctrl_c_stops_all(file: Path, arms: dict[str, Simulation], tmp_path: Path) -> None:
@@ -197,9 +244,8 @@ CELL_TEXT = CELL.format(left="sim:", right="sim:")
         ("left: zone nowhere", "no zone 'nowhere'; there are: bin"),
         ("left: barrier", "expected: barrier NAME"),
         ("left: move 1 2", "expected: move X Y Z"),
-        ("third: path 1 2 3", "no verb 'path' for third"),
-        ("third: move a", "'a' is not what it takes"),
-        ("", "it has no commands"),
+        ("third: path 1 2 3", "no verb 'path' for the ultraArm"),
+        ("third: move a 0 0", "x is a number, not 'a'"),
     ],
 )
 def test_wrong_programs(line: str, why: str) -> None:
