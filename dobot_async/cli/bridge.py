@@ -12,6 +12,7 @@ from dobot_async.cli.session import Session, run
 
 __all__ = ["FILE", "GROUPS", "bridge", "serve"]
 
+LONGEST_TOKEN = 4096
 GROUPS = ("wifi", "calibration", "firmware")
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -58,8 +59,10 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
 
 def token_in(file: Path) -> str:
     """Returns the token in a file; raises UsageError if there is none."""
-    token = file.read_bytes().strip()
-    if not token.isascii() or not token:
+    with file.open("rb") as opened:
+        token = opened.read(LONGEST_TOKEN + 1).strip()
+
+    if not token.isascii() or not 1 <= len(token) <= LONGEST_TOKEN:
         raise click.UsageError(f"{file} has no token: one word of printable ASCII characters")
 
     return token.decode("ascii")

@@ -17,6 +17,7 @@ from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass
 from typing import Any
 
+from dobot_async.cli.failures import StepRefused
 from dobot_async.cli.program import execute
 from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell
@@ -68,7 +69,8 @@ def parse_cell_program(lines: Iterable[str], cell: Cell) -> CellProgram:
     Raises:
         ProgramError: Lines are wrong, for at least one of their arms.
     """
-    parts = {name: Part(name, member, cell) for name, member in cell.members.items()}
+    barriers: dict[str, tuple[str, ...]] = {}
+    parts = {name: Part(name, member, cell, barriers) for name, member in cell.members.items()}
     problems = []
     for number, written in enumerate(lines, 1):
         text = bare(written)
@@ -121,15 +123,22 @@ def word_of(member: Member[Any]) -> str:
 class Part:
     """What one arm has to do, as far as it was read.
 
+    Args:
+        name: The arm's.
+        member: What it is.
+        cell: Where it is.
+        barriers: The arms that come to each barrier, as far as the program was read.
+
     Attributes:
         lines: Its lines.
     """
 
-    def __init__(self, name: str, member: Member[Any], cell: Cell) -> None:
+    def __init__(self, name: str, member: Member[Any], cell: Cell, barriers: dict[str, tuple[str, ...]]) -> None:
         self.lines: list[Step | Meeting] = []
         self._name = name
         self._member = member
         self._zones = cell.zones
+        self._barriers = barriers
         self._held: set[str] = set()
         self._reader: Reader = VOCABULARIES[word_of(member)].reader(member.options)
 
@@ -142,8 +151,12 @@ class Part:
         self.lines.append(self._meeting(number, text, arms) if word in WORDS else self._step(number, text))
 
     def _step(self, number: int, text: str) -> Step:
+        member = self._member
+        if not member.options.get("control", True):
+            raise ValueError(f"{self._name} takes no commands: its options say control = false")
+
         step = self._reader.read(number, text)
-        member, place = self._member, self._reader.checked.place
+        place = self._reader.checked.place
         if member.guard != "off" and step.verb in UNGUARDED:
             raise ValueError(f"{step.verb} is not for an arm with a guard: it plans with the tool that it began with")
 
@@ -166,6 +179,9 @@ class Part:
         if (word == "zone" and name in self._held) or (word == "leave" and name not in self._held):
             how = "is in it already" if word == "zone" else "is not in it"
             raise ValueError(f"{word} {name}: {self._name} {how}")
+
+        if word == "barrier" and set(self._barriers.setdefault(name, arms)) != set(arms):
+            raise ValueError(f"barrier {name} was for {', '.join(self._barriers[name])}, and is not for others later")
 
         if word != "barrier":
             self._held ^= {name}
@@ -225,3 +241,7 @@ async def meet(fleet: Fleet[Any], meeting: Meeting, held: dict[str, AsyncExitSta
     except DobotError as error:
         error.add_note(str(meeting))
         raise
+    except ValueError as error:
+        refused = StepRefused(str(error))
+        refused.add_note(str(meeting))
+        raise refused from error

@@ -39,7 +39,8 @@ def pose(session: Session) -> None:
 @click.pass_obj
 def alarms(session: Session, clear: bool) -> None:
     """Tell the alarms, with cause and remedy."""
-    session.only(*(name for name, family in FAMILIES.items() if family.alarms))
+    if not session.family.alarms:
+        session.only(*(name for name, family in FAMILIES.items() if family.alarms))
 
     async def question(arm: Any) -> tuple[object, ...]:
         if clear:
@@ -114,7 +115,9 @@ def suction(session: Session, state: str) -> None:
     On sucks, off lets go and stops the pump. Takes effect at once; what is in the arm's queue goes on.
     """
     on = ON_OFF[state]
-    session.only(*(name for name, family in FAMILIES.items() if family.pump))
+    if not session.family.pump:
+        session.only(*(name for name, family in FAMILIES.items() if family.pump))
+
     session.ask(lambda arm: session.family.suction(arm, on), queue="keep", on_error="leave")
     session.output.answer({"suction": on}, f"suction {state}")
 

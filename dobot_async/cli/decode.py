@@ -97,7 +97,9 @@ def bytes_in(family: Family, text: str) -> bytes:
         if family.text:
             return text.encode()
 
-        raise click.UsageError("expected pairs of hexadecimal digits, such as AA AA 02 0A 00 F6") from None
+        raise click.UsageError(
+            "expected pairs of hexadecimal digits, such as AA AA 02 0A 00 F6; or --file FILE"
+        ) from None
 
 
 def text_of(piece: dict[str, Any]) -> str:

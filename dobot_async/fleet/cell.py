@@ -29,6 +29,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn, cast
+from urllib.parse import urlsplit
 
 from dobot_async.arms.session import check_options
 from dobot_async.families import families
@@ -37,6 +38,7 @@ from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.seat import Member
 from dobot_async.fleet.shapes import Box, Cylinder, Shape
 from dobot_async.program.text import read_text, shortened
+from dobot_async.transports import SCHEMES, hidden
 
 __all__ = ["Cell", "parse_cell", "read_cell"]
 
@@ -97,6 +99,10 @@ def member(table: Mapping[str, Any]) -> Member[AnyArm]:
     """An arm."""
     known(table, ARM_KEYS, "an arm")
     url, family = text(table, "url"), text(table, "family", "magician")
+    if urlsplit(url).scheme not in SCHEMES:
+        forms = "; ".join(form for _, form in SCHEMES.values())
+        raise ValueError(f"url: {hidden(url)!r} has no scheme that leads to an arm; use one of: {forms}")
+
     kinds = {each.name: each.arm for each in FAMILIES}
     if family not in kinds:
         raise ValueError(f"family: one of {', '.join(kinds)}, not {family!r}")

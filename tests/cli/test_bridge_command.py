@@ -91,10 +91,11 @@ async def test_json_is_one_object_with_a_made_up_token(sim: Simulation) -> None:
         async with Magician.connect(f"{url}?token={answer['token']}", control=False) as arm:
             assert (await arm.get_info()).name == "Dobot Magician"
 
+        events = [json.loads(await line(process)) for _ in range(2)]
+        assert [event["what"] for event in events] == ["connected", "left"]
         process.send_signal(signal.SIGTERM)
         output, errors = await process.communicate()
-        assert (process.returncode, errors) == (143, b"")
-        assert [json.loads(event)["what"] for event in output.splitlines()] == ["connected", "left"]
+        assert (process.returncode, output, errors) == (143, b"", b"")
 
 
 @pytest.mark.parametrize("source", ["environment", "file"])

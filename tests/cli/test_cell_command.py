@@ -93,6 +93,10 @@ async def run(*arguments: str | Path) -> tuple[int, str, str]:
     return process.returncode, output.decode(), errors.decode()
 
 
+def rewrite(file: Path, old: str, new: str) -> None:
+    file.write_text(file.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+
+
 def places(sim: Simulation) -> list[tuple[float, float]]:
     return [(each.value.x, each.value.y) for each in sim.arm.executed if each.command is c.SET_PTP_CMD]
 
@@ -138,7 +142,7 @@ async def test_run_tells_the_line_of_a_failure_and_stops_all(
 ) -> None:
     program = tmp_path / "program.txt"
     program.write_text("right: wait 600\nthird: wait 600\nleft: wait 0.1\nleft: by 0 0 600\n", encoding="utf-8")
-    file.write_text(file.read_text(encoding="utf-8").replace('guard = "wait"', ""), encoding="utf-8")
+    rewrite(file, 'guard = "wait"', "")
     code, _, errors = await run("cell", file, "run", program)
     assert code == 1
     assert errors.count("\n") == 1
@@ -152,7 +156,7 @@ async def test_what_the_guard_refuses_under_way_is_a_failure_and_not_wrong_usage
     program = tmp_path / "program.txt"
     program.write_text("left: move 200 -180 20\nleft: wait 0.01\nleft: move 200 180 20\n", encoding="utf-8")
     limits = 'guard = "wait"\nlimits = { x = [190, 265] }'
-    file.write_text(file.read_text(encoding="utf-8").replace('guard = "wait"', limits, 1), encoding="utf-8")
+    rewrite(file, 'guard = "wait"', limits)
     code, _, errors = await run("cell", file, "run", program)
     assert (code, errors.count("\n")) == (1, 1)
     assert errors.startswith("error: left, line 3 (move 200 180 20): ")
@@ -169,6 +173,8 @@ async def test_what_the_guard_refuses_under_way_is_a_failure_and_not_wrong_usage
         (["left: move 200 0 50 l=100"], 1),
         (["left: wait 1", "left: leave bin"], 2),
         (["left: wait 1", "left: tool pen"], 2),
+        (["left, right: barrier x", "left: barrier x"], 2),
+        (["left:"], 1),
     ],
     ids=str,
 )
@@ -227,8 +233,8 @@ async def test_watch_draws_every_arm(file: Path) -> None:
 
 
 async def test_watch_says_what_is_wrong_with_an_arm_and_does_not_wait_for_it() -> None:
-    cell = parse_cell('[arms.left]\nurl = "nonsense"\n')
-    with pytest.raises(ValueError, match="no scheme"):
+    cell = parse_cell('[arms.left]\nurl = "sim:?fast=1"\n')
+    with pytest.raises(ValueError, match="fast"):
         await asyncio.wait_for(observe(cell, 50, 1, lambda _: None), 30)
 
 

@@ -21,7 +21,6 @@ from click.testing import CliRunner
 
 from dobot_async import Command, Magician, Pen
 from dobot_async.cli.main import cli
-from dobot_async.cli.main import COMMANDS
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import Parser
 from dobot_async.program import VOCABULARIES
@@ -333,7 +332,7 @@ async def test_a_program_is_executed_in_order(sim: Simulation, tmp_path: Path) -
 )
 def test_each_verb_is_the_command_of_the_queue(line: str, command: Command[Any, Any], value: Any) -> None:
     (step,) = VOCABULARIES["magician"].parse([line])
-    assert (step.number, step.text, step.verb) == (1, line, line.split()[0])
+    assert (step.number, step.text, step.verb) == (1, line, line.split(maxsplit=1)[0])
     assert (step.command, step.value) == (command, value)
 
 

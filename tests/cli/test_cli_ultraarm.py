@@ -124,6 +124,7 @@ def test_a_gcode_file(tmp_path: Path) -> None:
     assert "no commands" in call("gcode", str(file)).output
     file.write_bytes(b"\xff")
     assert "not UTF-8" in call("gcode", str(file)).output
+    file.write_text("G28\n")
     other = CliRunner().invoke(cli, ["--url", OWN, "gcode", str(file)])
     assert "for --arm ultraarm alone" in " ".join(other.output.split())
 

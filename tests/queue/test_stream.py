@@ -1,4 +1,4 @@
-"""`queue.stream`: steps of any source, as fast as the arm takes them, told as they are done; whose fault an error is."""
+"""`queue.stream`: steps of any source, as fast as the arm takes them, told as they are done; and what errors name."""
 
 from __future__ import annotations
 
