@@ -129,14 +129,12 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
         window: int,
         check_reach: bool,
         fresh: bool = False,
-        remember: bool = False,
     ) -> None:
         self.link = link
         self.wifi = WiFi(link)
         self.kinematics = Kinematics()
         self._check_reach = check_reach
         self._fresh = fresh
-        self._remember = remember
         self._executor = MagicianExecutor(link, window, self._check)
         self.queue = MagicianQueue(self._executor)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
@@ -203,7 +201,6 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
                 window=min(window, transport.window),
                 check_reach=check_reach,
                 fresh=control and queue == "fresh",
-                remember=control and reconnect,
             )
 
         async with arm_session(url, timeout, reopen, build, stop_on_error=control and on_error == "stop") as arm:
@@ -381,9 +378,6 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
             async with asyncio.timeout(timeout):
                 bias = await self.link.request(c.GET_END_EFFECTOR_PARAMS, None, timeout=timeout)
                 self.kinematics = Kinematics(bias.x_bias, bias.y_bias, bias.z_bias)
-                if self._remember:
-                    await self._executor.status.remember()
-
                 if self._fresh:
                     await self._executor.clear()
                     await self._executor.space.read()

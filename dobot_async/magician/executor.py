@@ -81,7 +81,6 @@ class MagicianExecutor(Submission):
             self.ledger = QueueLedger()
 
         self.space.was_cleared(self.ledger.last)
-        self.status.queue_cleared()
         self._relative = None
 
     async def pause(self) -> None:

@@ -43,13 +43,6 @@ class QueueSpace:
 
         return self.left
 
-    async def is_gone(self, last: int) -> bool:
-        """Read whether nothing lies in the queue, although the command with the index `last` was never thrown away."""
-        if self._capacity is None:
-            return True
-
-        return last > self._cleared and await self.read() >= self._capacity
-
     def posted(self) -> None:
         """A command goes out."""
         self._changes += 1

@@ -50,14 +50,13 @@ class Submission:
     def __init__(self, link: Link[Frame], window: int, check: Callable[[Any], None]) -> None:
         self.cleanup = link.cleanup
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
-        self.status = ArmStatus(link, self._restarted, lambda last: self.space.is_gone(last))  # noqa: PLW0108 - made of it
+        self.status = ArmStatus(link, self._restarted)
         self.ledger = QueueLedger()
         self.space = QueueSpace(self.status)
         self._link = link
         self._window = window
         self._check = check
         self._heard = -1  # the highest index that was acknowledged: another one is late, or a copy
-        self._backwards = 0  # commands in a row that got an index which was heard before
         self._serial_left = 0
         self._relative: str | None = None  # what was queued since the arm was idle and must not run twice
         self._guard = DatagramGuard(self, link)
@@ -167,18 +166,11 @@ class Submission:
         return True
 
     async def _settle(self, request: Request[Frame]) -> bool:
-        """Return whether a command was acknowledged; raise MotionUnknown if the arm is silent, or has begun anew."""
+        """Return whether a command was acknowledged; raise MotionUnknown if the arm is silent."""
         try:
-            answered = await self._link.settle(request, SILENCE)
+            return await self._link.settle(request, SILENCE)
         except ReplyTimeout as error:
             raise MotionUnknown(f"{error}, and nothing tells whether the arm took {self._names()}") from error
-
-        # On a stream an acknowledgement with an old index is late once, but not twice in a row: the arm counts anew.
-        self._backwards = 0 if answered else self._backwards + bool(request.misfit)
-        if self._backwards > 1 and not self._datagrams:
-            raise self.status.restarted()
-
-        return answered
 
     async def _post(self, entry: Entry, *, probe: bool = False, counted: int | None = None) -> Request[Frame]:
         """Send a command, and enter it as unacknowledged."""
@@ -197,16 +189,18 @@ class Submission:
             raise MotionUnknown(f"{error}, and nothing tells whether the arm took {self._names()}") from error
 
     def _index_of(self, frame: Frame) -> int:
-        """The index in an acknowledgement; one that was heard already is late or doubled."""
+        """The index in an acknowledgement; that of a command known to be taken is late or doubled."""
         index = INDEX.decode(frame.params)
-        if index <= self._heard:
-            raise ProtocolError(f"index {index} was heard already")
+        known = -1 if self.ledger.last is None else self.ledger.last
+        if index <= max(known, self._heard):
+            raise ProtocolError(f"index {index} belongs to an earlier command")
 
         self._heard = index
         return index
 
     async def _open(self) -> None:
         """Open the ledger with the index of a WAIT of 0 ms."""
+        await self.status.remember()
         for attempt in range(PROBES):
             cleared = self.space.empty
             index = await self._probe()
@@ -231,15 +225,13 @@ class Submission:
     async def _reconcile(self, source: Source) -> None:
         """Find out what became of the unacknowledged commands: those that the arm did not take are sent again."""
         ledger = self.ledger
-        for attempt in range(PROBES if ledger.unacked else 0):
+        for _ in range(PROBES if ledger.unacked else 0):
             if self._datagrams:
                 await self._datagrams.before_count()
 
             try:
-                if not attempt:
-                    await self.status.alarms()
-
                 counted = await self.space.count(ledger)
+                await self.status.check_run()
             except ReplyTimeout as error:
                 raise MotionUnknown(f"{error}, and nothing tells whether the arm took {self._names()}") from error
 
@@ -311,7 +303,6 @@ class Submission:
     def _restarted(self) -> None:
         """The arm was switched off and on: it counts its commands anew, and its queue is empty."""
         self._heard = -1
-        self._backwards = 0
         self.ledger = QueueLedger()
         self.space.restarted()
 

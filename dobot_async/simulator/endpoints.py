@@ -53,6 +53,18 @@ class Session(Protocol):
         """Takes bytes of requests, returns those of all replies to what is whole now."""
 
 
+class Lapse:
+    """The seconds of the event loop since this was made, times `speed`."""
+
+    def __init__(self, speed: float) -> None:
+        self.speed = speed
+        self._now = asyncio.get_running_loop().time
+        self._started = self._now()
+
+    def __call__(self) -> float:
+        return (self._now() - self._started) * self.speed
+
+
 class Simulation:
     """A simulated arm that can be reached.
 
@@ -234,9 +246,7 @@ async def simulate(
         raise ValueError(f"speed must be above 0 and finite, not {speed!r}")
 
     serve = endpoint(listen)
-    loop = asyncio.get_running_loop()
-    started = loop.time()
-    arm = MODELS[model](clock or (lambda: (loop.time() - started) * speed), **details)
+    arm = MODELS[model](clock or Lapse(speed), **details)
     simulation = Simulation(arm, faults or Faults(), seed)
     async with AsyncExitStack() as stack:
         simulation.url = await serve(simulation, stack)

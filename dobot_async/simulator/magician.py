@@ -99,6 +99,12 @@ class SimulatedMagician(MagicianBody):
         super().__init__(clock, options, limits or JointLimits())
         self.quirks = quirks
         self.counters = Counters()
+        self._lapse: float = getattr(clock, "speed", 1.0)
+
+    @property
+    def time_on(self) -> float:
+        """Seconds since power-up by the arm's own clock, which goes right in an arm that is simulated faster too."""
+        return self.device.uptime / self._lapse
 
     def session(self) -> Session:
         """Returns the arm's side of a connection to a new client."""
@@ -211,9 +217,9 @@ def analog(arm: SimulatedMagician, address: int) -> c.IOADC:
 READS: Mapping[Command[Any, Any], Callable[[SimulatedMagician, Any], Any]] = {
     c.GET_DEVICE_VERSION: version,
     c.GET_DEVICE_WITH_L: lambda arm, _: arm.state.has_rail,
-    c.GET_DEVICE_TIME: lambda arm, _: int(arm.device.uptime * 1000) % 2**32,
+    c.GET_DEVICE_TIME: lambda arm, _: int(arm.time_on * 1000) % 2**32,
     c.GET_DEVICE_ID: lambda _arm, _: (1, 2, 3),
-    c.GET_DEVICE_INFO: lambda arm, _: c.DeviceInfo(int(arm.device.uptime), 1, 0),
+    c.GET_DEVICE_INFO: lambda arm, _: c.DeviceInfo(int(arm.time_on), 1, 0),
     c.GET_POSE: lambda arm, _: arm.pose,
     c.GET_KINEMATICS: lambda arm, _: arm.speed(),
     c.GET_POSE_L: lambda arm, _: arm.rail,

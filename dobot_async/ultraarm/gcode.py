@@ -19,7 +19,6 @@ import os
 import re
 from collections.abc import AsyncIterator, Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -32,15 +31,13 @@ from dobot_async.program.step import Step as GCodeLine
 from dobot_async.program.text import lines_in, read_text, shortened
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.frame import split_words
+from dobot_async.ultraarm.gcode_text import bare
 from dobot_async.ultraarm.layouts import Words
 from dobot_async.wire import Command, Queueing
 
 __all__ = ["GCodeLine", "GCodeRun", "Source", "parse_gcode"]
 
 Source = str | os.PathLike[str] | Iterable[str]
-CHECKSUM = re.compile(r"\*\d+$")
-BEGINNING = re.compile(r"[(;]")
-IN_NUMBERS = "0123456789."
 EXPONENT = re.compile(r"\de[-+]?\d")
 IGNORED = {"G17", "G21", "G40", "G49", "G80", "G94"}
 ENDING = {"M2", "M30"}
@@ -87,33 +84,6 @@ def lines_of(source: Source) -> Iterable[str]:
     return source
 
 
-def bare(line: str) -> str:
-    """Return a line without comments and checksum; raise ValueError where a comment cannot be told from the rest."""
-    line = line.strip()
-    if line == "%":
-        return ""
-
-    if "\n" in line or "\r" in line:
-        raise ValueError(f"{shortened(line)!r} has a line break in it")
-
-    pieces, at = [], 0
-    while (begins := BEGINNING.search(line, at)) and begins[0] == "(":
-        ends = line.find(")", begins.end())
-        if ends < 0:
-            raise ValueError("a comment that begins with ( ends with ) in the same line")
-
-        pieces.append(line[at : begins.start()].strip())
-        at = ends + 1
-
-    pieces.append(line[at : begins.start() if begins else None].strip())
-    pieces = [piece for piece in pieces if piece]
-    for before, after in pairwise(pieces):
-        if before[-1] in IN_NUMBERS and after[0] in IN_NUMBERS:
-            raise ValueError("there is a comment in the middle of a number")
-
-    return CHECKSUM.sub("", " ".join(pieces)).strip()
-
-
 class Reader:
     """What the lines so far mean for the next one.
 
@@ -143,6 +113,10 @@ class Reader:
                 return
 
             command = row_of(name)
+            letters_only = [each[0] for each in letters]
+            if len({*letters_only}) < len(letters):
+                raise ValueError(f"{name} has a letter twice")
+
             value = command.request.decode("".join(letters).encode("ascii"))
             if isinstance(value, c.CoordsMove) and all(getattr(value, axis) is None for axis in AXES):
                 self._speed = value.f
@@ -170,9 +144,6 @@ class Reader:
             if letter in "GM" and not (groups and letter in letters_of(groups[-1][0])):
                 groups.append((f"{letter}{int(number)}" if number.isdigit() else letter + number, []))
             elif groups:
-                if any(word[0] == letter for word in groups[-1][1]):
-                    raise ValueError(f"{letter} stands twice in one command")
-
                 groups[-1][1].append(letter + number)
             elif letter in MOVING and self._moves:
                 groups.append(("G0", [letter + number]))

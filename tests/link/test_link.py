@@ -233,6 +233,22 @@ async def test_however_many_are_lost_in_a_row_it_is_mended_behind_them(losses: i
         assert link.stats.repeated == 1
 
 
+async def test_the_next_barrier_has_another_key_for_the_answer_to_the_last_one_may_be_lost() -> None:
+    """The answer to a second one of its key would pass for that to the first, and prove nothing of what is between."""
+    async with line() as (link, wire):
+        wire.fates = chain(repeat(None, 4), repeat(LATENCY))  # three questions, and the first barrier among them
+        calls = [start(asked(link, c.GET_DEVICE_ID, timeout=30)), start(asked(link, timeout=30))]
+        while not any(wire.times(key) for key in BARRIER_KEYS):  # noqa: ASYNC110 - the link decides when
+            await asyncio.sleep(LATENCY / 10)
+
+        calls.append(start(asked(link, c.GET_POSE, timeout=30)))
+        await asyncio.sleep(0)
+        wire.say(wire.answer(question(c.GET_DEVICE_ID)))
+        await asyncio.gather(*calls)
+        barriers = [frame.key for _, frame in wire.sent if frame.key in BARRIER_KEYS]
+        assert len(set(barriers)) == len(barriers) == 2
+
+
 @pytest.mark.parametrize("fate", [None, LOST])
 async def test_what_must_not_be_repeated_is_sent_once(fate: float | None) -> None:
     async with line() as (link, wire):

@@ -11,7 +11,8 @@ import pytest
 from virtual import virtual
 
 from dobot_async import ConnectionLost, LinkState, Magician, MotionUnknown, ReplyTimeout
-from dobot_async.simulator import DeviceOptions, Simulation, simulate
+from dobot_async.magician import commands as c
+from dobot_async.simulator import DeviceOptions, Faults, Simulation, simulate
 
 
 def targets(sim: Simulation) -> list[tuple[float, float]]:
@@ -114,7 +115,7 @@ async def test_an_outage_of_a_few_ms_is_no_restart() -> None:
             assert targets(sim) == [(200 + step, 0)]
 
 
-@pytest.mark.parametrize("uptime", [0.0, 5.0, CLOCK / 4, CLOCK + 5.0])
+@pytest.mark.parametrize("uptime", [0.0, 5.0, CLOCK / 4, CLOCK * 3 / 4, CLOCK + 5.0])
 @virtual
 async def test_an_arm_that_was_switched_off_is_recognised_by_its_clock_alone(uptime: float) -> None:
     async with on_for(uptime) as sim, Magician.connect(sim.url, reconnect=True) as arm:
@@ -127,6 +128,85 @@ async def test_an_arm_that_was_switched_off_is_recognised_by_its_clock_alone(upt
 
         await arm.move_to(210, 0, 40)
         assert targets(sim) == [(210, 0)]
+
+
+@pytest.mark.parametrize("initial", [0, 1, 2**64 - 1])
+@pytest.mark.parametrize("capacity", [1, 8])
+@pytest.mark.parametrize("behind", [False, True])
+@virtual
+async def test_an_arm_switched_off_while_the_line_stays_open_is_recognised(
+    initial: int, capacity: int, behind: bool
+) -> None:
+    """Its alarms are set all the time, so that the one of a restart tells nothing."""
+    options = DeviceOptions(initial_index=initial, capacity=capacity)
+    async with simulate(options=options) as sim, Magician.connect(sim.url) as arm:
+        await arm.move_to(220, 0, 40)
+        motion = await arm.queue.move_to(200, 100, 40)
+        sim.arm.power_cycle()
+        with pytest.raises(MotionUnknown, match="switched off and on"):
+            if behind:
+                motion = await arm.queue.move_to(200, -100, 40)
+
+            await motion.wait(10)
+
+        await arm.move_to(210, 0, 40)
+        assert targets(sim)[-1] == (210, 0)
+
+
+@virtual
+async def test_nothing_is_done_that_an_arm_was_told_before_it_was_switched_off() -> None:
+    """Its first command after that has the index of an earlier one, and its acknowledgement is lost."""
+    async with simulate() as sim, Magician.connect(sim.url) as arm:
+        await asyncio.sleep(5)
+        motions = [await arm.queue.move_to(200 + step, 100, 40) for step in range(5)]
+        sim.arm.power_cycle()
+        sim.faults = Faults(loss=0.5)
+        with pytest.raises(MotionUnknown, match="switched off and on"):
+            await arm.queue.move_to(200, -100, 40)
+
+        for motion in motions:
+            with pytest.raises(MotionUnknown):
+                await motion
+
+
+@pytest.mark.parametrize("days", [0.01, 10, 49.7, 120])
+@virtual
+async def test_an_arm_that_has_nothing_to_do_for_days_was_not_switched_off(days: float) -> None:
+    async with simulate() as sim, Magician.connect(sim.url) as arm:
+        await arm.move_to(220, 0, 40)
+        for _ in range(200):
+            await asyncio.sleep(432 * days)  # the virtual clock takes no step of a day or more
+
+        sim.faults = Faults(loss=0.2)
+        for step in range(20):
+            await arm.move_to(200 + step, 0, 40)
+
+        assert targets(sim)[1:] == [(200 + step, 0) for step in range(20)]
+
+
+@virtual
+async def test_an_arm_that_is_paused_was_not_switched_off() -> None:
+    async with simulate() as sim, Magician.connect(sim.url) as arm:
+        await arm.pause()
+        motion = await arm.queue.move_to(220, 0, 40)
+        waiting = asyncio.create_task(motion.wait())
+        await asyncio.sleep(60)
+        await arm.resume()
+        await waiting
+        assert targets(sim) == [(220, 0)]
+
+
+@virtual
+async def test_old_firmware_without_a_clock_is_driven_all_the_same(caplog: pytest.LogCaptureFixture) -> None:
+    async with simulate() as sim, Magician.connect(sim.url) as arm:
+        answer = sim.arm.answer
+        sim.arm.answer = lambda frame: b"" if frame.id == c.GET_DEVICE_TIME.id else answer(frame)
+        await arm.move_to(220, 0, 40)
+        await asyncio.sleep(5)
+        await arm.move_to(200, 0, 40)
+        assert targets(sim) == [(220, 0), (200, 0)]
+
+    assert "does not tell its clock" in caplog.text
 
 
 @virtual

@@ -202,8 +202,9 @@ def check_failure(
 
     if isinstance(error, MotionUnknown):
         excused = seen.silent(begun - LINGERING, ended, UNHEARD) or (plan.doubles and "step" in plan.kinds)
-        # Nothing can tell a command from a probe, where both are lost and the arm has no index yet.
-        excused = excused or (plan.loses and seen.has_no_index(begun - LINGERING, ended))
+        # Nothing can tell a command from a probe, where both are lost and the arm has no index yet. A datagram that
+        # stands still for longer than others may overtake it is lost, too.
+        excused = excused or ((plan.loses or plan.datagrams) and seen.has_no_index(begun - LINGERING, ended))
         ensure(excused, f"unknown without a silence: {error!r}: {what}")
     elif isinstance(error, ReplyTimeout):
         lost = plan.loses and ended - begun >= BRIEF

@@ -22,6 +22,9 @@ HARD = {
     23: "a line that is silent, and open",
     531: "a motion that is aborted because its connection's block was left, and that the arm ticks off",
     1401: "an alarm that holds a motion back of which nobody knows any more",
+    710848: "an arm that is switched off and on while the line stays open, with a command under way",
+    800859: "an acknowledgement that comes late, when its command is known to be taken, and another one was sent",
+    801433: "an arm that was switched off and on once, and not again",
     153: "a question that waits for its turn, and then for its answer",
 }
 """What once broke a promise, each found in the scenario as it is now."""

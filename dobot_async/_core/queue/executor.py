@@ -8,10 +8,10 @@ from typing import Any, Protocol, TypeVar
 
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
-from dobot_async.errors import ArmAlarm, MotionUnknown
+from dobot_async.errors import ArmAlarm, DobotError, MotionUnknown, ReplyTimeout
 from dobot_async.wire import Command
 
-__all__ = ["Entry", "Executor", "Source", "alarmed", "in_motions"]
+__all__ = ["Entry", "Executor", "Source", "alarmed", "in_motions", "unseen"]
 
 Q = TypeVar("Q")
 
@@ -110,6 +110,14 @@ def in_motions(error: ArmAlarm, motions: Sequence[object]) -> ArmAlarm:
     if error.motions or not motions:
         return error
 
-    first, *_, last = motions[0], motions[-1]
+    first, last = motions[0], motions[-1]
     where = f"{first}" if len(motions) == 1 else f"{first}{' or' if len(motions) == 2 else ' to'} {last}"
     return ArmAlarm(f"{error}; in {where}", error.alarms, motions)
+
+
+def unseen(error: DobotError) -> DobotError:
+    """What an error means to Motions: an arm that does not answer may do them, or not."""
+    if isinstance(error, ReplyTimeout):
+        return MotionUnknown(f"the arm no longer answers, and what it does cannot be seen: {error}")
+
+    return error

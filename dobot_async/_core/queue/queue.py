@@ -17,11 +17,11 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Coroutine, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Coroutine, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any, TypeVar, overload
 
-from dobot_async._core.queue.executor import Entry, Executor, alarmed, in_motions
+from dobot_async._core.queue.executor import Entry, Executor, alarmed, in_motions, unseen
 from dobot_async._core.queue.motion import WITHDRAWN, Motion, Outbox
 from dobot_async._core.queue.poller import StatusPoller
 from dobot_async._core.queue.stopper import Stopper
@@ -265,27 +265,35 @@ class MotionQueue:
         """Run work while nothing is sent; a stop ends it, and raises MotionStopped."""
         await self._writer.exclusively(work, what)
 
-    async def look(self, *, alarms: bool) -> None:
-        """Ask the arm how far it is, and end the Motions that this decides."""
+    @property
+    def next(self) -> Motion | None:
+        """The Motion that ends next, None if none is pending."""
+        return self._pending[0] if self._pending else None
+
+    async def look(self, *, alarms: bool, index: bool = True) -> None:
+        """Ask the arm how far it is, and end the Motions that this decides.
+
+        Args:
+            alarms: Read the alarms even if no Motion has ended.
+            index: False reads them alone.
+        """
         # What a stop ends the arm ticks off as it does what is done: nothing that is read while it goes on tells which.
-        stops = self._stopper.count
-        if self._stopper.under_way:
-            return
+        if not self._stopper.under_way:
+            with self._unless_stopped():
+                await self._look(self._stopper.count, alarms=alarms, index=index)
 
-        try:
-            await self._look(stops, alarms=alarms)
-        except (MotionUnknown, ReplyTimeout):
-            if self._stopper.count == stops:
-                raise
-
-    async def _look(self, stops: int, *, alarms: bool) -> None:
-        ticket = await self._executor.completed()
+    async def _look(self, stops: int, *, alarms: bool, index: bool) -> None:
+        ticket = await self._executor.completed() if index else None
         reached = [motion for motion in self._pending if ticket is not None and (motion.index or 0) <= ticket]
         if self._stopper.count != stops or not (reached or alarms):
             return
 
         blocking = await self._executor.alarms()
         if self._stopper.count != stops:
+            return
+
+        if blocking and not index:
+            await self._look(stops, alarms=True, index=True)  # first, which of them was done
             return
 
         for motion in reached:
@@ -303,14 +311,19 @@ class MotionQueue:
 
     async def rest(self) -> float | None:
         """Return seconds within which no Motion can end; None where nothing tells."""
-        if self._stopper.under_way or not self._pending:
-            return None
+        if not self._stopper.under_way and self._pending:
+            with self._unless_stopped():
+                return await self._executor.earliest_end(self._pending[0].entry)
 
-        return await self._executor.earliest_end(self._pending[0].entry)
+        return None
 
     async def no_more_room(self, error: ArmAlarm) -> None:
         """The arm has no room, and makes none, because of alarms."""
-        await self.update()  # which tells the motions that were done from those that were not
+        try:
+            await self.update()  # which tells the motions that were done from those that were not
+        except DobotError as failure:
+            self.give_up(unseen(failure))
+
         if not self._stopper.under_way:
             self.begin_stop(in_motions(error, self._first_moving()))
 
@@ -337,6 +350,16 @@ class MotionQueue:
     def _first_moving(self) -> Sequence[Motion]:
         """The first motion that is not known to be done, if there is one."""
         return [motion for motion in self._pending if motion.moves and not motion.ended][:1]
+
+    @contextmanager
+    def _unless_stopped(self) -> Iterator[None]:
+        """What goes wrong in this block is of no interest if a stop has begun meanwhile."""
+        stops = self._stopper.count
+        try:
+            yield
+        except (MotionUnknown, ReplyTimeout):
+            if self._stopper.count == stops:
+                raise
 
     def _prune(self) -> None:
         while self._pending and self._pending[0].ended:
