@@ -17,7 +17,7 @@ import pytest
 from click.testing import CliRunner
 
 from dobot_async import Magician
-from dobot_async.cli.cell import observe
+from dobot_async.cli.cell_watch import observe
 from dobot_async.cli.cell_program import parse_cell_program
 from dobot_async.cli.main import cli
 from dobot_async.fleet.cell import parse_cell, read_cell
