@@ -26,6 +26,7 @@ FAMILY = Family(
     simulator="dobot_async.simulator.magician:SimulatedMagician",
     bridge="dobot_async.magician.bridged:BRIDGED",
     discovery="dobot_async.discovery.families:MAGICIAN",
-    cli="dobot_async.cli.families:MAGICIAN",
+    cli="dobot_async.cli.arms.magician:MAGICIAN",
     fleet="dobot_async.fleet.families:MAGICIAN",
+    program="dobot_async.magician.vocabulary:VOCABULARY",
 )

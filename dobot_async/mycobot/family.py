@@ -18,6 +18,7 @@ FAMILY = Family(
     simulator="dobot_async.simulator.mycobot:SIMULATED",
     bridge="dobot_async.mycobot.bridged:BRIDGED",
     discovery="dobot_async.discovery.families:MYCOBOT",
-    cli="dobot_async.cli.cobots:COBOTS",
+    cli="dobot_async.cli.arms.mycobot:COBOTS",
     fleet="dobot_async.fleet.families:MYCOBOT",
+    program="dobot_async.mycobot.vocabulary:VOCABULARIES",
 )

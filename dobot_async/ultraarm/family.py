@@ -14,6 +14,7 @@ FAMILY = Family(
     simulator="dobot_async.simulator.ultraarm:SimulatedUltraArm",
     bridge="dobot_async.ultraarm.bridged:BRIDGED",
     discovery="dobot_async.discovery.families:ULTRAARM",
-    cli="dobot_async.cli.families:ULTRAARM",
+    cli="dobot_async.cli.arms.ultraarm:ULTRAARM",
     fleet="dobot_async.fleet.families:ULTRAARM",
+    program="dobot_async.ultraarm.vocabulary:VOCABULARY",
 )

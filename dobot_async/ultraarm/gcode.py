@@ -9,7 +9,8 @@
 
 Line numbers (N10) and checksums (*71) count for nothing, nor do G17, G21, G40, G49, G80 and G94, which say what is so
 anyway. F is mm/s, as the arm has it, not mm/min. What the arm has no command for is an error, and so is what asks it
-something. A program begins in absolute coordinates, and leaves the arm in them.
+something, a letter twice in one command, and a comment that is not closed in its line. A % stands alone on its line. A
+program begins in absolute coordinates, and leaves the arm in them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import AsyncIterator, Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,40 +26,23 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import DobotError, MotionStopped, ProtocolError
+from dobot_async.program.step import ProgramError
+from dobot_async.program.step import Step as GCodeLine
+from dobot_async.program.text import lines_in, read_text, shortened
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.frame import split_words
+from dobot_async.ultraarm.gcode_text import bare
 from dobot_async.ultraarm.layouts import Words
 from dobot_async.wire import Command, Queueing
 
 __all__ = ["GCodeLine", "GCodeRun", "Source", "parse_gcode"]
 
 Source = str | os.PathLike[str] | Iterable[str]
-COMMENT = re.compile(r"\([^)]*\)|;.*|%|\*\d+\s*$")
 EXPONENT = re.compile(r"\de[-+]?\d")
 IGNORED = {"G17", "G21", "G40", "G49", "G80", "G94"}
 ENDING = {"M2", "M30"}
 AXES = ("x", "y", "z", "e")
 MOVING = "XYZEF"
-
-
-@dataclass(frozen=True, slots=True)
-class GCodeLine:
-    """One command of a program, checked.
-
-    Attributes:
-        number: Of its line, from 1; 0 for what the program did not ask for itself.
-        text: Of its line.
-        command: The row of the table.
-        value: Its parameters.
-    """
-
-    number: int
-    text: str
-    command: Command[Any, Any]
-    value: Any
-
-    def __str__(self) -> str:
-        return f"line {self.number} ({self.text})"
 
 
 def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> tuple[GCodeLine, ...]:
@@ -69,25 +53,25 @@ def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> t
         limits: What the arm may be told. Increments are looked at where it is known from where.
 
     Raises:
-        ValueError: Lines are wrong; the message has each with its number.
+        ProgramError: Lines are wrong; the message has each with its number.
+        ValueError: The file is not UTF-8 text.
         OSError: The file cannot be read.
     """
     reader = Reader(limits)
     found: list[GCodeLine] = []
     wrong = []
     for number, written in enumerate(lines_of(source), 1):
-        text = COMMENT.sub(" ", written).strip()
         try:
-            for command, value in reader.read(text):
+            for command, value in reader.read(bare(written)):
                 found.append(GCodeLine(number, written.strip(), command, value))
         except (ValueError, TypeError, ProtocolError) as error:
-            wrong.append(f"line {number}: {error}")
+            wrong.append((number, str(error)))
 
         if reader.ended:
             break
 
     if wrong:
-        raise ValueError("\n".join(wrong))
+        raise ProgramError(wrong)
 
     return tuple(found)
 
@@ -95,7 +79,7 @@ def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> t
 def lines_of(source: Source) -> Iterable[str]:
     """Return the lines of a program."""
     if isinstance(source, (str, os.PathLike)):
-        return Path(source).read_text(encoding="utf-8-sig").splitlines()
+        return lines_in(read_text(Path(source)))
 
     return source
 
@@ -129,6 +113,10 @@ class Reader:
                 return
 
             command = row_of(name)
+            letters_only = [each[0] for each in letters]
+            if len({*letters_only}) < len(letters):
+                raise ValueError(f"{name} has a letter twice")
+
             value = command.request.decode("".join(letters).encode("ascii"))
             if isinstance(value, c.CoordsMove) and all(getattr(value, axis) is None for axis in AXES):
                 self._speed = value.f
@@ -141,12 +129,12 @@ class Reader:
     def _groups(self, text: str) -> Iterator[tuple[str, list[str]]]:
         """Yield the commands of a line, each with its own words."""
         if EXPONENT.search(text):
-            raise ValueError(f"{text!r} has an exponent, which the arm would read as its fourth axis")
+            raise ValueError(f"{shortened(text)!r} has an exponent, which the arm would read as its fourth axis")
 
         try:
             words = split_words(text.encode("ascii"))
         except ValueError:
-            raise ValueError(f"{text!r} is no G-code") from None
+            raise ValueError(f"{shortened(text)!r} is no G-code") from None
 
         groups: list[tuple[str, list[str]]] = []
         for letter, number in words:

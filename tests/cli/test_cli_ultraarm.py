@@ -117,12 +117,14 @@ def test_a_gcode_file(tmp_path: Path) -> None:
     for wrong in (call("gcode", str(file)), call("gcode", "--dry-run", str(file))):
         assert wrong.exit_code == 2
         assert "line 2: x must be in" in wrong.output
-        assert "line 3: G7" in wrong.output
+        assert "(wrong as well: line 3); nothing was sent" in wrong.output
+        assert wrong.output.count("\n") == 1
 
     file.write_text("; nothing\n")
     assert "no commands" in call("gcode", str(file)).output
     file.write_bytes(b"\xff")
     assert "not UTF-8" in call("gcode", str(file)).output
+    file.write_text("G28\n")
     other = CliRunner().invoke(cli, ["--url", OWN, "gcode", str(file)])
     assert "for --arm ultraarm alone" in " ".join(other.output.split())
 

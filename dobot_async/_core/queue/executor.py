@@ -11,7 +11,7 @@ from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import ArmAlarm, DobotError, MotionUnknown, ReplyTimeout
 from dobot_async.wire import Command
 
-__all__ = ["Entry", "Executor", "Source", "alarmed", "unseen"]
+__all__ = ["Entry", "Executor", "Source", "alarmed", "in_motions", "unseen"]
 
 Q = TypeVar("Q")
 
@@ -103,6 +103,16 @@ class Executor(Protocol):
 def alarmed(alarms: Sequence[object]) -> ArmAlarm:
     """What to raise because of alarms."""
     return ArmAlarm(f"the arm raised alarms: {'; '.join(map(str, alarms))}", alarms)
+
+
+def in_motions(error: ArmAlarm, motions: Sequence[object]) -> ArmAlarm:
+    """Say in which motion an alarm came up: the only one of several, or from the first to the last of them."""
+    if error.motions or not motions:
+        return error
+
+    first, last = motions[0], motions[-1]
+    where = f"{first}" if len(motions) == 1 else f"{first}{' or' if len(motions) == 2 else ' to'} {last}"
+    return ArmAlarm(f"{error}; in {where}", error.alarms, motions)
 
 
 def unseen(error: DobotError) -> DobotError:
