@@ -15,6 +15,7 @@ from dobot_async.errors import (
     MotionUnknown,
     ProtocolError,
     ReplyTimeout,
+    UnsupportedError,
 )
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.magician.alarms import Alarm
@@ -35,7 +36,8 @@ from dobot_async.mycobot.alarms import CobotAlarm
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.models import CobotModel
 from dobot_async.mycobot.params import Coords, EndType, GripperType, MoveMode, PinMode, ReferenceFrame
-from dobot_async.mycobot.readings import CobotInfo, CobotPose
+from dobot_async.mycobot.pose import CobotPose
+from dobot_async.mycobot.readings import CobotInfo
 from dobot_async.transports import open_transport
 from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
 from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits
@@ -95,6 +97,7 @@ __all__ = [
     "UltraArmLimits",
     "Unexpected",
     "Unreachable",
+    "UnsupportedError",
     "discover",
     "open_transport",
 ]

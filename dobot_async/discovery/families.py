@@ -61,11 +61,9 @@ async def probe_mycobot(url: str, timeout: float) -> DeviceInfo:
 
         try:
             async with MyCobot.connect(url, model=model, control=False, timeout=left) as arm:
-                version = (await arm.get_info()).system_version
+                return await arm.get_info()
         except ConnectFailed as error:
             problem = error
-        else:
-            return DeviceInfo(serial_number="", name="", version="" if version is None else f"{version:g}")
 
     raise problem
 
