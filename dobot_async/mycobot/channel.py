@@ -145,7 +145,12 @@ class Channel:
         try:
             answer = await self.ask(command, value, timeout=timeout if command in self._answered else first)
         except (ReplyTimeout, ProtocolError):
-            await self.ask(c.IS_MOVING, None, timeout=self._left(deadline))
+            try:
+                await self.ask(c.IS_MOVING, None, timeout=self._left(deadline))
+            except ReplyTimeout:
+                silent = f"no answer to {command.name} from {self.link.url} within {timeout:.3g} s"
+                raise ReplyTimeout(silent) from None
+
             self._unanswered[command] += 1
             return None
 

@@ -53,7 +53,7 @@ def test_motions_end_where_they_lead() -> None:
 @pytest.mark.parametrize(
     ("arm", "arguments", "why"),
     [
-        ("mycobot", ["move", "1", "2", "3"], "must have 6 values for this arm, not 3"),
+        ("mycobot", ["move", "--mode", "joints", "1", "2", "3"], "must have 6 values for this arm, not 3"),
         ("mycobot", ["move", "1", "2", "3", "4", "5", "6", "7"], "at most 6 numbers"),
         ("mycobot", ["move", "--mode", "jump", "1", "2", "3"], "one of to, linear, joints"),
         ("mycobot", ["move", "--mode", "joints", "170", "0", "0", "0", "0", "0"], "joint 1 must be in"),
