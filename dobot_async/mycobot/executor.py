@@ -157,7 +157,11 @@ class CobotRunner:
         if entry.command is MOVE_PARTLY:
             entry = await self._whole(entry, reached)
 
-        goal = await GOALS[entry.command](self._goals, entry.value)
+        try:
+            goal = await GOALS[entry.command](self._goals, entry.value)
+        except ValueError as error:
+            raise CommandRejected(f"{entry.command.name}: the step was not sent, for where it leads: {error}") from None
+
         if getattr(entry.value, "mode", None) is c.MoveMode.LINEAR:
             await self._follow_lines()
 

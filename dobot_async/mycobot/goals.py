@@ -18,6 +18,8 @@ STEPS = 4096 / 360  # of an encoder, in a degree
 class Goals:
     """Make the goals of one arm's motions; what is relative is told from where the arm stands now.
 
+    They raise ValueError for a step that leads out of the model's range.
+
     Attributes:
         channel: The arm.
         degrees: How near an angle has to come.
@@ -44,7 +46,9 @@ class Goals:
     async def joint_step(self, value: c.JointMove) -> Goal:
         """One joint, from where it is now."""
         here = await self.channel.poll(c.GET_ANGLES, None)
-        return self.joints({value.joint - 1: here[value.joint - 1] + value.angle})
+        target = here[value.joint - 1] + value.angle
+        self.channel.model.check_joint(value.joint, target)
+        return self.joints({value.joint - 1: target})
 
     def coords(self, expected: Mapping[int, float]) -> Goal:
         """Coordinates, by their places."""
@@ -64,7 +68,11 @@ class Goals:
     async def coord_step(self, value: c.CoordStep) -> Goal:
         """One coordinate, from where it is now."""
         here = await self.channel.poll(c.GET_COORDS, None)
-        return self.coords({value.axis - 1: here[value.axis - 1] + value.value})
+        target = here[value.axis - 1] + value.value
+        if value.axis <= 3:  # angles go round
+            self.channel.model.check_coord(value.axis, target)
+
+        return self.coords({value.axis - 1: target})
 
     async def solution(self, value: c.SetSolutionAngle) -> Goal:
         """The elbow of an arm with 7 joints."""
