@@ -49,7 +49,7 @@ class Reached:
 
     Attributes:
         worker: The task that did it: there is another one as soon as the queue was empty in between.
-        frames: What coordinates were of then; see `Channel`.
+        frames: What coordinates were of when it began; see `Channel`.
         coords: All of its target.
     """
 
@@ -154,6 +154,7 @@ class CobotRunner:
     async def _move(self, entry: Entry) -> None:
         """Do a motion."""
         reached, self._reached = self._reached, None
+        frames = self._channel.frames
         if entry.command is MOVE_PARTLY:
             entry = await self._whole(entry, reached)
 
@@ -170,7 +171,7 @@ class CobotRunner:
         await self._channel.send(entry.frame, entry.command)
         await self._watch(goal, entry, before)
         if entry.command is c.SEND_COORDS:
-            self._reached = Reached(asyncio.current_task(), self._channel.frames, entry.value.coords)
+            self._reached = Reached(asyncio.current_task(), frames, entry.value.coords)
 
     async def _whole(self, entry: Entry, reached: Reached | None) -> Entry:
         """The motion to a target of which a part was given; raise CommandRejected where the whole is out of range."""

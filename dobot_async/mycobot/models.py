@@ -119,16 +119,22 @@ class CobotModel:
             ValueError: There is no such joint or axis, or the numbers are no range.
             TypeError: They are no numbers.
         """
+        if not limits:
+            return self
+
         found = dict(zip(self.words, (*self.joint_limits, *self.reach), strict=True))
         for word, each in limits.items():
             if word not in found:
                 raise ValueError(f"limits: a {self.title} has {', '.join(found)}, not {word!r}")
 
-            low, high = (to_float(end, f"limits of {word}") for end in each)
-            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            if not isinstance(each, Iterable):
+                raise TypeError(f"limits: {word} must have a least and a greatest value, not {each!r}")
+
+            ends = [to_float(end, f"limits of {word}") for end in each]
+            if not (len(ends) == 2 and all(map(math.isfinite, ends)) and ends[0] < ends[1]):
                 raise ValueError(f"limits: {word} must have a least and a greatest value, finite, not {each!r}")
 
-            found[word] = low, high
+            found[word] = ends[0], ends[1]
 
         values = tuple(found.values())
         return replace(self, joint_limits=values[: self.joints], reach=values[self.joints :])
