@@ -23,6 +23,7 @@ NEW, OLD = MyCobotQuirks(), MyCobotQuirks(acknowledges=False, later=False)
 firmwares = pytest.mark.parametrize("quirks", [NEW, OLD], ids=["new", "old"])
 BENT = (30.0, -20.0, -40.0, -10.0, 20.0, 60.0)
 DOWN = (150.0, 60.0, 200.0, -180.0, 0.0, -90.0)
+GOALS = ((160, 60, 200, -150, 0, -90), DOWN, (150, 80, 160, -180, 0, -90), (-120, 150, 200, -180, 0, 0))
 
 
 def told(sim: Simulation) -> list[tuple[float, ...]]:
@@ -62,7 +63,7 @@ async def test_a_queued_target_is_seen_from_the_one_before_it_and_not_from_where
             batch.move_by(x=5, z=-10)
 
         await arm.queue.join()
-        x, y, z, *turns = DOWN
+        x, y, _, *turns = DOWN
         assert told(sim) == [DOWN, (x, y, 180, *turns), (x + 5, y, 180, *turns), (x + 10, y, 170, *turns)]
         stands = sim.arm.coords
         assert max(abs(a - b) for a, b in zip(stands[:3], told(sim)[-1][:3], strict=True)) > 1
@@ -156,7 +157,7 @@ async def test_each_model_has_the_servos_that_it_has() -> None:
             assert sim.arm.gripper.value == pytest.approx(50)
             await arm.focus()
             for wrong in {5, 8, 9} - {*range(1, arm.model.joints + 1), gripper}:
-                with pytest.raises(ValueError, match="servos 1 to|in 1 to 8"):
+                with pytest.raises(ValueError, match=r"servos 1 to|in 1 to 8"):
                     await arm.request(c.GET_ENCODER, wrong)
 
     with pytest.raises(ValueError, match="rx only"):
@@ -166,7 +167,8 @@ async def test_each_model_has_the_servos_that_it_has() -> None:
 
 @virtual
 async def test_numbers_and_flags_of_numpy_are_taken() -> None:
-    async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
+    async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as connected:
+        arm: Any = connected
         await arm.gripper(np.bool_(False))
         assert sim.arm.gripper.value == 100
         await arm.gripper_to(np.float32(40))
@@ -184,7 +186,7 @@ async def test_numbers_and_flags_of_numpy_are_taken() -> None:
 
 @virtual
 async def test_limits_of_ones_own() -> None:
-    limits = {"j2": (-30, 30), "z": (100, np.float32(300))}
+    limits: Any = {"j2": (-30, 30), "z": (100, np.float32(300))}
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url, limits=limits) as arm:
         await arm.move_joint(2, 30)
         sim.arm.guide_to(*BENT)
@@ -241,12 +243,19 @@ async def test_an_arm_as_inexact_as_users_report_it_is_believed() -> None:
         off = []
         async with MyCobot.connect(sim.url) as arm:
             await arm.move_joints(20, -20, -60, 40, 10, 0)
-            for goal in ((160, 60, 200, -150, 0, -90), DOWN, (150, 80, 160, -180, 0, -90), (-120, 150, 200, -180, 0, 0)):
+            for goal in (
+                (160, 60, 200, -150, 0, -90),
+                DOWN,
+                (150, 80, 160, -180, 0, -90),
+                (-120, 150, 200, -180, 0, 0),
+            ):
                 await arm.move_to(*goal)
                 stands = sim.arm.coords
                 await arm.move_to(*goal)
                 assert sim.arm.coords == pytest.approx(stands, abs=0.1), "told again it stays where it is"
-                off.append((max(abs(a - b) for a, b in zip(stands[:3], goal[:3], strict=True)), turned(stands[3:], goal[3:])))
+                off.append(
+                    (max(abs(a - b) for a, b in zip(stands[:3], goal[:3], strict=True)), turned(stands[3:], goal[3:]))
+                )
 
         assert all(2 <= mm <= 5 and 1 <= degrees <= 3 for mm, degrees in off), off
         async with MyCobot.connect(sim.url, tolerance=(1.0, 1.0)) as arm:
@@ -308,17 +317,17 @@ async def test_recover_does_not_say_that_an_arm_is_ready_that_is_not() -> None:
 @virtual
 async def test_a_straight_line_is_straight_in_either_fresh_mode(quirks: MyCobotQuirks) -> None:
     async with simulate("mycobot280", quirks=quirks) as sim, MyCobot.connect(sim.url) as arm:
+        sim.arm.guide_to(20, -20, -60, 40, 10, 0)
         for fresh in (False, True):
-            sim.arm.guide_to(30, -20, 40, -10, 20, 60)
+            await arm.move_to(150, 80, 200, -180, 0, -90)
             await arm.request(c.SET_FRESH_MODE, fresh)
-            start = await arm.get_coords()
-            motion = await arm.queue.move_to(z=start.z - 60, mode=c.MoveMode.LINEAR)
+            motion = await arm.queue.move_to(y=-80, mode=c.MoveMode.LINEAR)
             while not motion.done:
-                assert sim.arm.coords[:2] == pytest.approx((start.x, start.y), abs=0.6)
+                assert (sim.arm.coords[0], sim.arm.coords[2]) == pytest.approx((150, 200), abs=0.6)
                 await asyncio.sleep(0.05)
 
             await motion
-            assert sim.arm.coords[2] == pytest.approx(start.z - 60, abs=0.2)
+            assert sim.arm.coords[1] == pytest.approx(-80, abs=0.2)
             assert sim.arm.settings[c.SET_FRESH_MODE] is False
 
 
@@ -340,11 +349,12 @@ async def test_a_mode_of_the_caller_is_left_alone_by_other_motions(quirks: MyCob
 async def test_a_gripper_is_done_when_it_rests(quirks: MyCobotQuirks) -> None:
     async with simulate("mycobot280", quirks=quirks) as sim, MyCobot.connect(sim.url) as arm:
         loop = asyncio.get_running_loop()
-        for act, value in (
+        acts: list[tuple[Any, float]] = [
             (lambda: arm.gripper(False, speed=20), 100),
             (lambda: arm.gripper_to(70, speed=20), 70),
             (lambda: arm.gripper(True, speed=20), 0),
-        ):
+        ]
+        for act, value in acts:
             way, at = abs(sim.arm.gripper.value - value), loop.time()
             await act()
             assert (sim.arm.gripper.value, sim.arm.gripper.moving) == (value, False)
@@ -437,7 +447,7 @@ async def test_a_gripper_of_which_nothing_is_told_is_unknown() -> None:
 @virtual
 async def test_the_time_of_a_gripper_is_over() -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
-        with pytest.raises(ReplyTimeout, match="not seen to be done within 0.5 s"):
+        with pytest.raises(ReplyTimeout, match=r"not seen to be done within 0\.5 s"):
             await arm.gripper(False, speed=5, timeout=0.5)
 
         assert sim.arm.gripper.moving
@@ -464,9 +474,7 @@ async def test_a_pause_that_was_lost_is_said_again(monkeypatch: pytest.MonkeyPat
         for row, act in ((c.PAUSE, arm.pause), (c.RESUME, arm.resume)):
             swallowed: list[bytes] = []
 
-            def request(
-                data: bytes, row: Any = row, swallowed: list[bytes] = swallowed
-            ) -> list[tuple[float, bytes]]:
+            def request(data: bytes, row: Any = row, swallowed: list[bytes] = swallowed) -> list[tuple[float, bytes]]:
                 if data[3] == row.id and not swallowed:
                     swallowed.append(data)
                     return []

@@ -192,7 +192,7 @@ async def test_beyond_a_limit_of_the_arm(quirks: MyCobotQuirks, verb: Verb, plac
     async with arms(quirks) as (sim, arm):
         sim.arm.ways.limits[0] = (-45, 45)
         before = Seen.of(sim)
-        with pytest.raises(ArmAlarm if quirks is NEW else CommandRejected, match="limit|within reach"):
+        with pytest.raises(ArmAlarm if quirks is NEW else CommandRejected, match=r"limit|within reach"):
             await place(arm, verb.name, verb.args, verb.kwargs)
 
         assert Seen.of(sim) == before
@@ -344,7 +344,7 @@ async def test_a_jog(quirks: MyCobotQuirks, direction: str) -> None:
 
         sim.arm.power(on=True)
         sim.arm.release(None)
-        with pytest.raises(CommandRejected, match="did not move.*are the servos on"):
+        with pytest.raises(CommandRejected, match=r"did not move.*are the servos on"):
             await arm.jog(direction, 0.5)
 
         assert Seen.of(sim).joints == after.joints
