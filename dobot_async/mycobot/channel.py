@@ -21,7 +21,6 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import CommandRejected, ProtocolError, ReplyTimeout
 from dobot_async.mycobot import commands as c
-from dobot_async.mycobot.checks import check
 from dobot_async.mycobot.frame import Frame
 from dobot_async.mycobot.models import CobotModel, lengths
 from dobot_async.wire import Command, Layout
@@ -90,7 +89,7 @@ class Channel:
         """
         row = self.model.row(command)
         data = row.request.encode(value)
-        check(self.model, command, value)
+        self.model.check(command, value)
         timeout = self._chosen(timeout, row.timeout)
         if data and len(data) in lengths(row.reply):
             timeout /= 2
@@ -161,6 +160,10 @@ class Channel:
         """Return whether the arm answers a read, as far as is known yet."""
         return command in self._answered or self._unanswered[command] < UNSUPPORTED
 
+    def likely_knows(self, command: Command[Any, Any]) -> bool:
+        """Return whether the arm answers a read of later firmware: one that acknowledges nothing is older."""
+        return command in self._answered or (self._acknowledges and self.may_know(command))
+
     async def tell(self, command: Command[Q, None], value: Q, *, timeout: float | None = None) -> bool:
         """Set something that may be said more than once.
 
@@ -179,7 +182,7 @@ class Channel:
         """
         row = self.model.row(command)
         frame = self.link.frame(row, value)
-        check(self.model, command, value)
+        self.model.check(command, value)
         self.frames += command in OF_FRAMES
         timeout = self._chosen(timeout, row.timeout)
         deadline = self._now() + timeout

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dobot_async.mycobot import commands as c
-from dobot_async.mycobot.models import CobotModel
 from dobot_async.mycobot.targets import PartOfMove
 from dobot_async.wire import Command
 
+if TYPE_CHECKING:
+    from dobot_async.mycobot.models import CobotModel
+
 __all__ = ["check"]
 
-Check = Callable[[CobotModel, Any], None]
+Check = Callable[["CobotModel", Any], None]
 
 
 def check(model: CobotModel, command: Command[Any, Any], value: Any) -> None:
@@ -35,6 +37,16 @@ def servo(model: CobotModel, value: Any) -> None:
 def axis(model: CobotModel, value: Any) -> None:
     """It has the axis."""
     model.check_axis(value.axis)
+
+
+def joint_number(model: CobotModel, value: int) -> None:
+    """It has the joint."""
+    model.check_has_joint(value)
+
+
+def servo_number(model: CobotModel, value: int) -> None:
+    """It has the servo."""
+    model.check_servo(value)
 
 
 def servo_or_all(model: CobotModel, value: int) -> None:
@@ -74,12 +86,12 @@ def part_of_move(model: CobotModel, value: PartOfMove) -> None:
 
 OF_ROW: Mapping[Command[Any, Any], Check] = {
     c.JOG_INCREMENT: joint,
-    c.GET_JOINT_MIN_ANGLE: CobotModel.check_has_joint,
-    c.GET_JOINT_MAX_ANGLE: CobotModel.check_has_joint,
-    c.GET_ENCODER: CobotModel.check_servo,
-    c.IS_SERVO_ENABLE: CobotModel.check_servo,
-    c.SET_SERVO_CALIBRATION: CobotModel.check_servo,
-    c.JOINT_BRAKE: CobotModel.check_servo,
+    c.GET_JOINT_MIN_ANGLE: joint_number,
+    c.GET_JOINT_MAX_ANGLE: joint_number,
+    c.GET_ENCODER: servo_number,
+    c.IS_SERVO_ENABLE: servo_number,
+    c.SET_SERVO_CALIBRATION: servo_number,
+    c.JOINT_BRAKE: servo_number,
     c.FOCUS_SERVO: servo_or_all,
 }
 """What the row alone tells."""

@@ -22,11 +22,10 @@ from dobot_async.errors import ArmAlarm, CommandRejected, MotionStopped, ReplyTi
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.alarms import SERVO_LOSS, CobotAlarm, joint_alarms, motion_alarm
 from dobot_async.mycobot.channel import SILENCE, Channel
-from dobot_async.mycobot.checks import check
 from dobot_async.mycobot.goals import GOALS, Goals
 from dobot_async.mycobot.gripper import GRIPPER, run_gripper
 from dobot_async.mycobot.stopping import stop_until_still
-from dobot_async.mycobot.targets import MOVE_PARTLY, WAIT
+from dobot_async.mycobot.targets import MOVE_PARTLY, SUCTION, WAIT
 from dobot_async.mycobot.watch import LOOKS, Goal, Verdict, Watch, cannot_read_servos
 from dobot_async.wire import Command, Queueing
 
@@ -40,7 +39,7 @@ POLL = 0.05  # seconds between two looks; the Atom takes 20 ms for each reading
 SOON = 0.3  # seconds before the end of a motion from when on it is looked at without a pause
 CHECK, CHECK_LATER = 1.0, 2.0  # seconds between two questions for errors; they cost looks where the end is near
 PAUSE_TIME = 1.0  # seconds within which an arm says that it is paused, or that it is not any more
-ON_THIS_SIDE = frozenset({WAIT, MOVE_PARTLY})
+ON_THIS_SIDE = frozenset({WAIT, MOVE_PARTLY, SUCTION})
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +78,7 @@ class CobotRunner:
             whole = c.ToMove(tuple(each or 0.0 for each in value.coords), value.speed, value.mode)
             self._channel.link.frame(model.row(c.SEND_COORDS), whole, queued=True)
 
-        check(model, command, value)
+        model.check(command, value)
         return Entry(command, value, frame)
 
     async def run(self, entry: Entry) -> None:
@@ -167,7 +166,10 @@ class CobotRunner:
             await self._follow_lines()
 
         # An arm keeps what was wrong with an earlier motion until it is cleared: that is no reason for what comes now.
-        before = await self._channel.poll_if_known(c.GET_ERROR_INFORMATION, None)
+        before = None
+        if self._channel.likely_knows(c.GET_ERROR_INFORMATION):
+            before = await self._channel.poll_if_known(c.GET_ERROR_INFORMATION, None)
+
         await self._channel.send(entry.frame, entry.command)
         await self._watch(goal, entry, before)
         if entry.command is c.SEND_COORDS:
@@ -257,6 +259,9 @@ class CobotRunner:
         name = entry.command.name
         powered = await self.is_powered()
         far = f"{missed:.1f} (mm or degrees) from where it was to go"
+        stale = motion_alarm(await self._channel.ask_if_known(c.GET_ERROR_INFORMATION, None) or 0)
+        earlier = f"; it tells {stale[0].name}, maybe of an earlier motion (clear_alarms)" if stale else ""
+        far += earlier
         wider = "connect(tolerance=(degrees, mm)) says how near counts as there"
         if verdict is Verdict.SHORT:
             power = "" if powered else "; it has no power any more"

@@ -23,8 +23,10 @@ from typing import Any, TypeVar, cast
 
 from dobot_async._core.util.arguments import to_float
 from dobot_async.mycobot import commands as c
+from dobot_async.mycobot.checks import check
 from dobot_async.mycobot.frame import Known
 from dobot_async.mycobot.layouts import Many
+from dobot_async.mycobot.pose import AXES
 from dobot_async.mycobot.variants import PositionLayout
 from dobot_async.wire import Command, Layout
 
@@ -34,7 +36,6 @@ Q = TypeVar("Q")
 R = TypeVar("R")
 Range = tuple[float, float]
 Dialect = Mapping[Command[Any, Any], Mapping[str, Any]]
-AXES = ("x", "y", "z", "rx", "ry", "rz")
 FAMILY, DEFAULT = "mycobot", "mycobot280"
 TURN: Range = (-180.0, 180.0)
 SENTINEL = 180.08
@@ -111,6 +112,10 @@ class CobotModel:
         """Raise ValueError for an axis that it does not have."""
         if not 1 <= axis <= len(self.reach):
             raise ValueError(f"a {self.title} has the axes 1 to {len(self.reach)}, not {axis}")
+
+    def check(self, command: Command[Any, Any], value: Any) -> None:
+        """Raise ValueError for parameters of a command that this model cannot do, whatever its pose."""
+        check(self, command, value)
 
     def limited(self, limits: Mapping[str, Range]) -> CobotModel:
         """Return this model with limits of the user's own, by the words j1, j2 ... and x, y, z, rx, ry, rz.

@@ -3,6 +3,7 @@
     move_to(z=120)        MOVE_PARTLY    what is not given stays as it is
     move_by(x=10)         MOVE_PARTLY    all is told from where the arm is
     wait(0.5)             WAIT
+    suction(True)         SUCTION        refused: these arms have none
 
 Such a target is made whole when its turn comes, for the queue is on this side: from the target of the motion right
 before it, if that was queued before it was done and gave all coordinates; else from where the arm stands then.
@@ -16,13 +17,13 @@ from dataclasses import dataclass
 from typing import Any, SupportsFloat
 
 from dobot_async._core.util.arguments import check_duration, to_float
+from dobot_async.errors import UnsupportedError
 from dobot_async.layouts import NOTHING
-from dobot_async.mycobot.models import AXES
 from dobot_async.mycobot.params import Coords, MoveMode
-from dobot_async.mycobot.pose import CobotPose
+from dobot_async.mycobot.pose import AXES, CobotPose
 from dobot_async.wire import Command, Queueing
 
-__all__ = ["MOVE_PARTLY", "WAIT", "PartOfMove", "coordinates"]
+__all__ = ["MOVE_PARTLY", "SUCTION", "WAIT", "PartOfMove", "coordinates"]
 
 Given = tuple[float | None, ...]
 
@@ -74,6 +75,14 @@ class Seconds(OnThisSide):
         return b""
 
 
+class Lacking(OnThisSide):
+    """What an arm does not have; the value is what the arm is called."""
+
+    def encode(self, value: str) -> bytes:
+        """Raise UnsupportedError."""
+        raise UnsupportedError(f"a {value} has no suction of its own; a pump at a pin is switched with set_pin()")
+
+
 def on_this_side(name: str, layout: OnThisSide, *, moves: bool) -> Command[Any, None]:
     """A command that the arm does not have."""
     return Command(
@@ -83,6 +92,9 @@ def on_this_side(name: str, layout: OnThisSide, *, moves: bool) -> Command[Any, 
 
 WAIT: Command[float, None] = on_this_side("Wait", Seconds(), moves=False)
 """The queue on this side holds for so many seconds."""
+
+SUCTION: Command[str, None] = on_this_side("Suction", Lacking(), moves=False)
+"""Is refused wherever it is put."""
 
 MOVE_PARTLY: Command[PartOfMove, None] = on_this_side("SendCoords", OnThisSide(), moves=True)
 """It becomes a SendCoords with all coordinates when its turn comes."""

@@ -14,14 +14,13 @@ MotionStopped if it came to rest elsewhere, MotionUnknown or ReplyTimeout if the
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, Generic, NoReturn, SupportsFloat, TypeVar
+from typing import Any, Generic, SupportsFloat, TypeVar
 
 from dobot_async._core.util.arguments import to_float
-from dobot_async.errors import UnsupportedError
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.models import AXES, CobotModel
 from dobot_async.mycobot.pose import CobotPose
-from dobot_async.mycobot.targets import MOVE_PARTLY, WAIT, PartOfMove, coordinates, of_pose
+from dobot_async.mycobot.targets import MOVE_PARTLY, SUCTION, WAIT, PartOfMove, coordinates, of_pose
 from dobot_async.wire import Command
 
 __all__ = ["Axis", "Verbs", "axis_number"]
@@ -199,11 +198,9 @@ class Verbs(Generic[T]):
 
         return self.perform(c.SET_GRIPPER_VALUE, c.SetGripperValue(round(value), speed, kind), timeout)
 
-    def suction(self, on: bool, *, timeout: float | None = None) -> NoReturn:  # noqa: ARG002 - as other arms have it
+    def suction(self, on: bool, *, timeout: float | None = None) -> T:  # noqa: ARG002 - as other arms have it
         """Raise UnsupportedError: these arms have no pump of their own."""
-        raise UnsupportedError(
-            f"a {self.model.title} has no suction of its own; a pump at a pin is switched with set_pin()"
-        )
+        return self.perform(SUCTION, self.model.title, timeout)
 
     def color(self, red: int, green: int, blue: int, *, timeout: float | None = None) -> T:
         """Set the light of the Atom, 0 to 255 each."""
