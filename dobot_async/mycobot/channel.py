@@ -161,8 +161,12 @@ class Channel:
         return command in self._answered or self._unanswered[command] < UNSUPPORTED
 
     def likely_knows(self, command: Command[Any, Any]) -> bool:
-        """Return whether the arm answers a read of later firmware: one that acknowledges nothing is older."""
-        return command in self._answered or (self._acknowledges and self.may_know(command))
+        """Return whether the arm answers a read of later firmware, as far as is known.
+
+        One that acknowledges nothing, though newer firmware of its model does, is older.
+        """
+        newer = self._acknowledges or not self.model.acknowledges
+        return command in self._answered or (newer and self.may_know(command))
 
     async def tell(self, command: Command[Q, None], value: Q, *, timeout: float | None = None) -> bool:
         """Set something that may be said more than once.
