@@ -2,6 +2,7 @@
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.queue.motion import Motion
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.contract import LinkState, LinkStats, Unexpected
 from dobot_async.discovery import DiscoveryProblem, Found, discover
 from dobot_async.errors import (
@@ -14,10 +15,11 @@ from dobot_async.errors import (
     MotionUnknown,
     ProtocolError,
     ReplyTimeout,
+    UnsupportedError,
 )
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.magician.alarms import Alarm
-from dobot_async.magician.arm import DeviceInfo, Jog, Magician
+from dobot_async.magician.arm import Jog, Magician
 from dobot_async.magician.effectors import Gripper, Laser, Pen, SuctionCup
 from dobot_async.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.magician.params import (
@@ -34,7 +36,8 @@ from dobot_async.mycobot.alarms import CobotAlarm
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.models import CobotModel
 from dobot_async.mycobot.params import Coords, EndType, GripperType, MoveMode, PinMode, ReferenceFrame
-from dobot_async.mycobot.readings import CobotInfo, CobotPose
+from dobot_async.mycobot.pose import CobotPose
+from dobot_async.mycobot.readings import CobotInfo
 from dobot_async.transports import open_transport
 from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
 from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits
@@ -94,6 +97,7 @@ __all__ = [
     "UltraArmLimits",
     "Unexpected",
     "Unreachable",
+    "UnsupportedError",
     "discover",
     "open_transport",
 ]

@@ -7,8 +7,8 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 from dobot_async.mycobot import commands as c
-from dobot_async.mycobot.executor import WAIT
 from dobot_async.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
+from dobot_async.mycobot.targets import WAIT
 from dobot_async.mycobot.verbs import Verbs
 from dobot_async.program.vocabulary import NUMBER, ON_OFF, WHOLE, Verb, Vocabulary, choice, takes
 from dobot_async.wire import Command

@@ -17,6 +17,8 @@ from dobot_async.simulator.work import INSTANT, Activity, DeviceOptions, Execute
 
 __all__ = ["Course"]
 
+MOMENT = 0.005  # seconds to both sides over which a speed is taken
+
 
 @dataclass(slots=True)
 class Active:
@@ -100,6 +102,22 @@ class Course:
     def joints(self) -> Vector:
         """Where the joints are."""
         return next((found for found in map(self._joints_of, self.active) if found is not None), self._resting)
+
+    @property
+    def joint_speeds(self) -> Vector:
+        """How fast the joints turn, from where they are a moment before and after now."""
+        still = (0.0,) * len(self._resting)
+        if self.frozen_at is not None:
+            return still
+
+        for active in self.active:
+            elapsed = self.time - active.origin
+            ends = max(elapsed - MOMENT, 0.0), elapsed + MOMENT
+            before, after = map(active.activity.at, ends)
+            if before is not None and after is not None:
+                return tuple((b - a) / (ends[1] - ends[0]) for a, b in zip(before, after, strict=True))
+
+        return still
 
     @property
     def left(self) -> int:

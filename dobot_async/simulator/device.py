@@ -69,6 +69,12 @@ class Device:
         return self._course.joints
 
     @property
+    def joint_speeds(self) -> Vector:
+        """How fast the joints turn, degrees/s."""
+        self.advance()
+        return self._course.joint_speeds
+
+    @property
     def moving(self) -> bool:
         """Whether a motion goes on, in the queue or beside it."""
         self.advance()

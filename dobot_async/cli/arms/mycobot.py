@@ -19,7 +19,7 @@ from dobot_async.mycobot.alarms import CobotAlarm
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.frame import Frame, Parser
 from dobot_async.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
-from dobot_async.mycobot.readings import CobotPose
+from dobot_async.mycobot.pose import CobotPose
 
 __all__ = ["COBOTS"]
 
@@ -67,7 +67,7 @@ def joint_words(pose: CobotPose) -> str:
 
 async def info(arm: MyCobot) -> Told:
     """The model, and the versions of its firmware."""
-    found = await arm.get_info()
+    found = await arm.get_versions()
     versions = [each or "unknown" for each in (found.system_version, found.basic_version)]
     return Told(found, f"model          {found.model}\nfirmware       {versions[0]}\nM5             {versions[1]}")
 
