@@ -2,8 +2,9 @@
 
 Types and fields have the manual's names (fields in snake_case); the fields lie on the wire in their order. Lengths are
 mm, angles degrees, velocities mm/s or degrees/s, accelerations mm/s² or degrees/s², ratios percent; what is otherwise
-says so. There is a module for each few chapters of the manual. A docstring ends with the manual's section, or with the version of it that has the command first.
-Where the manual is wrong the layout is the arm's: docs/manual-vs-arm.md has the list.
+says so. There is a module for each few chapters of the manual. A docstring ends with the manual's section, or with
+the version of it that has the command first. Where the manual is wrong the layout is the arm's:
+docs/manual-vs-arm.md has the list.
 """
 
 from __future__ import annotations

@@ -7,7 +7,6 @@ from enum import IntEnum
 from typing import Annotated
 
 from dobot_async.layouts import Counted
-from dobot_async.layouts import Counted
 from dobot_async.magician.frame import MAX_PARAMS
 from dobot_async.magician.params.io import Level
 from dobot_async.wire import Record, Scalar, f32, f32x4, u8
