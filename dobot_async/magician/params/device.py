@@ -78,6 +78,11 @@ class Pose:
     j3: f32
     j4: f32
 
+    @property
+    def joints(self) -> tuple[float, float, float, float]:
+        """The four joint angles, degrees."""
+        return self.j1, self.j2, self.j3, self.j4
+
 
 @dataclass(frozen=True, slots=True)
 class ResetPose:

@@ -139,11 +139,21 @@ class ColorSensor:
 
 @dataclass(frozen=True, slots=True)
 class Color:
-    """What the colour sensor sees, 0 to 255 each. V1.1."""
+    """What the colour sensor sees. V1.1.
+
+    Documents say 0 to 255 each; arms give flags: 1 for the colour that it is, 0 for the others.
+    """
 
     r: u8
     g: u8
     b: u8
+
+    @property
+    def name(self) -> str:
+        """The colour that is the strongest, "red", "green" or "blue"; "" where none is."""
+        strongest = max(self.r, self.g, self.b)
+        found = [name for name, value in (("red", self.r), ("green", self.g), ("blue", self.b)) if value == strongest]
+        return found[0] if strongest and len(found) == 1 else ""
 
 
 @dataclass(frozen=True, slots=True)
