@@ -12,12 +12,14 @@ import pytest
 import dobot_async
 
 NAMES = [
+    "AccessoryVersion",
     "Alarm",
     "ArmAlarm",
     "CobotAlarm",
     "CobotInfo",
     "CobotModel",
     "CobotPose",
+    "Color",
     "ColorPort",
     "Command",
     "CommandRejected",
@@ -65,6 +67,7 @@ NAMES = [
     "UltraArmLimits",
     "Unexpected",
     "Unreachable",
+    "UnsupportedError",
     "discover",
     "open_transport",
 ]

@@ -25,13 +25,16 @@ def to_number(
         ValueError: It is outside, or not finite.
         TypeError: It is no number.
     """
+    wrong = TypeError(f"{name} must be a number, not {value!r}")
     if not (hasattr(value, "__float__") or hasattr(value, "__index__")):
-        raise TypeError(f"{name} must be a number, not {value!r}")
+        raise wrong
 
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
+    except TypeError:  # an array of several
+        raise wrong from None
 
     if not least <= number <= most:
         raise ValueError(f"{name} must be {described(least, most)}{unit and f' {unit}'}, not {value!r}")

@@ -23,7 +23,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from virtual import run_virtual, virtual
 
-from dobot_async import ConnectFailed, Magician
+from dobot_async import ConnectFailed, IOFunction, Magician
 from dobot_async.simulator import Faults, Simulation, endpoints, simulate
 from dobot_async.simulator.faults import Channel
 from dobot_async.transports import Transport, open_transport
@@ -958,6 +958,7 @@ async def test_the_speed_of_sim_is_the_arms() -> None:
 @virtual
 async def test_each_sim_is_an_arm_of_its_own() -> None:
     async with Magician.connect("sim:") as one, Magician.connect("sim:") as other:
+        await one.configure_io(1, IOFunction.DO)
         await one.set_output(1, level=True)
         assert await one.get_output(1)
         assert not await other.get_output(1)
