@@ -282,7 +282,7 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
         """Do what a plan makes of the goal of what is queued before it, or of where the arm stands."""
         timeout, loop = check_timeout(timeout), asyncio.get_running_loop()
         started = loop.time()
-        command, value = plan(await self.queue.find_goal(needs))
+        command, value = await self.queue.planned(plan, needs)
         left = None if timeout is None else max(0.0, timeout - (loop.time() - started))
         await run_owned(self.queue, self.link.cleanup, command, value, left)
 

@@ -12,7 +12,7 @@ from dobot_async._core.queue.motion import WITHDRAWN, Motion, Outbox
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_choice
 from dobot_async._core.util.tasks import STAYING
-from dobot_async.errors import DobotError, MotionUnknown
+from dobot_async.errors import DobotError, MotionStopped, MotionUnknown
 from dobot_async.magician import commands as c
 from dobot_async.magician.declared import Declarations, told_rail
 from dobot_async.magician.executor import MagicianExecutor
@@ -43,6 +43,7 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
         self._arm = executor
         self._own: Motion | None = None
         self._spare_tools = False
+        self._order = asyncio.Lock()
 
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, Motion]:
         """Queue a command; see `put`."""
@@ -50,7 +51,14 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
 
     async def perform_from_goal(self, plan: Plan, needs: Need, timeout: float | None) -> Motion:
         """Queue what a plan makes of the goal of what is queued before it, or of where the arm stands."""
-        return await self.put(*plan(await self.find_goal(needs)), timeout=timeout)
+        return await self.put(*await self.planned(plan, needs), timeout=timeout)
+
+    async def planned(self, plan: Plan, needs: Need) -> tuple[Command[Any, None], Any]:
+        """Return what a plan makes of the goal; raise MotionStopped if the arm was stopped while that was found out."""
+        stops = self._stopper.count
+        goal = await self.find_goal(needs)
+        self._check_stops(stops)
+        return plan(goal)
 
     async def put_all(self, motions: Sequence[Motion], *, timeout: float | None = None) -> None:
         """Give several commands to the arm's queue with nothing between them; see `MotionQueue.put_all`.
@@ -58,9 +66,15 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
         Raises:
             ValueError: One needs a rail, or a pin, that was not declared; none was sent.
         """
-        values = [motion.entry.value for motion in motions]
+        values, call, stops = [motion.entry.value for motion in motions], object(), self._stopper.count
+        for motion in motions:
+            motion.call = call
+
         try:
-            await self.declared.check(values, queued=True)
+            async with self._order:  # nothing overtakes what has to ask first
+                await self.declared.check(values, queued=True)
+
+            self._check_stops(stops)
         except BaseException:
             for motion in motions:
                 motion.end(WITHDRAWN)
@@ -169,6 +183,11 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
         outbox.add(program.motions)
         async with self._arm.cleanup.at_end(self._arm.end_download, "the end of the download"):
             await self.exclusively(self._arm.download(outbox, loops), "the download")
+
+    def _check_stops(self, count: int) -> None:
+        """Raise MotionStopped if there was a stop since so many."""
+        if self._stopper.count != count:
+            raise MotionStopped("it was not sent: the arm was stopped meanwhile")
 
     def _before(self, more: Iterable[Motion] = ()) -> Iterable[Motion]:
         """What has not ended, in its order, and some more."""

@@ -49,6 +49,7 @@ INTERNAL = frozenset(
         "perform_from_goal",
         "goal",
         "find_goal",
+        "planned",
         "prepare",
         "put_all",
         "stopping",
