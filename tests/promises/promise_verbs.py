@@ -223,6 +223,9 @@ def magician() -> list[Verb]:
     async def alarmed(arm: Any) -> None:
         await arm.queue.move_to(*far)
 
+    async def half_open(place: Any) -> None:
+        await place.gripper_to(50)
+
     return [
         *(read(name) for name in ("get_pose", "get_info", "get_alarms", "get_joints")),
         read("get_rail", prepare=lambda arm: arm.set_rail()),
@@ -259,8 +262,8 @@ def magician() -> list[Verb]:
         *two("conveyor", 1000, long=False),
         *two("conveyor_mm", 10, pulses_per_mm=160, long=False),
         *two("set_home", 200, 0, 50, long=False),
-        Verb("gripper_to", lambda arm, _: arm.gripper_to(50), refused=True, at_once=True),
-        Verb("queue.gripper_to", lambda arm, _: arm.queue.gripper_to(50), refused=True, at_once=True),
+        Verb("gripper_to", lambda arm, _: half_open(arm), refused=True),
+        Verb("queue.gripper_to", lambda arm, _: half_open(arm.queue), refused=True),
         *two("set_speed", 50, long=False),
         Verb("queue.put", lambda arm, _: arm.queue.put(m.SET_PTP_CMD, m.PTPCmd(m.PTPMode.MOVJ_XYZ, *far, 0))),
         Verb("queue.download", lambda arm, _: download(arm), LONG, core=True, what="leaving"),
