@@ -16,6 +16,7 @@ from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from random import Random
 from typing import Any
+from urllib.parse import urlsplit
 
 import anyio
 import pytest
@@ -944,6 +945,18 @@ def test_the_seed_of_sim_reaches_the_line() -> None:
     url = "sim:?loss=0.3&jitter=0.1&seed="
     assert answers(f"{url}1", count=50) == answers(f"{url}1", count=50)
     assert answers(f"{url}1", count=50) != answers(f"{url}2", count=50)
+
+
+@pytest.mark.parametrize(("url", "homed"), [("sim:", True), ("sim:?homed=true", True), ("sim:?homed=false", False)])
+@virtual
+async def test_sim_is_homed_unless_it_is_told_otherwise(url: str, homed: bool) -> None:
+    transport: Any = await endpoints.open_url(urlsplit(url), arm="magician")
+    assert transport._simulation.arm.homed is homed
+    await transport.aclose()
+    with pytest.raises(ValueError, match="expected true or false"):
+        await endpoints.open_url(urlsplit("sim:?homed=maybe"), arm="magician")
+    async with simulate() as sim:
+        assert not sim.arm.homed
 
 
 @virtual
