@@ -19,10 +19,13 @@ from dobot_async.errors import (
 )
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.magician.alarms import Alarm
-from dobot_async.magician.arm import Jog, Magician
+from dobot_async.magician.arm import Magician
 from dobot_async.magician.effectors import Gripper, Laser, Pen, SuctionCup
+from dobot_async.magician.jogs import Jog
 from dobot_async.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.magician.params import (
+    AccessoryVersion,
+    Color,
     ColorPort,
     EndEffectorParams,
     HHTTrigMode,
@@ -44,12 +47,14 @@ from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArm
 from dobot_async.wire import Command
 
 __all__ = [
+    "AccessoryVersion",
     "Alarm",
     "ArmAlarm",
     "CobotAlarm",
     "CobotInfo",
     "CobotModel",
     "CobotPose",
+    "Color",
     "ColorPort",
     "Command",
     "CommandRejected",

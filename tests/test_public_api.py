@@ -12,12 +12,14 @@ import pytest
 import dobot_async
 
 NAMES = [
+    "AccessoryVersion",
     "Alarm",
     "ArmAlarm",
     "CobotAlarm",
     "CobotInfo",
     "CobotModel",
     "CobotPose",
+    "Color",
     "ColorPort",
     "Command",
     "CommandRejected",

@@ -9,10 +9,13 @@ __all__ = ["FAMILY"]
 FAMILY = Family(
     public={
         "dobot_async.magician.alarms": ("Alarm",),
-        "dobot_async.magician.arm": ("Jog", "Magician"),
+        "dobot_async.magician.arm": ("Magician",),
         "dobot_async.magician.effectors": ("Gripper", "Laser", "Pen", "SuctionCup"),
+        "dobot_async.magician.jogs": ("Jog",),
         "dobot_async.magician.kinematics": ("JointLimits", "Kinematics", "Unreachable"),
         "dobot_async.magician.params": (
+            "AccessoryVersion",
+            "Color",
             "ColorPort",
             "EndEffectorParams",
             "HHTTrigMode",

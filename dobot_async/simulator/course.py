@@ -187,6 +187,19 @@ class Course:
                 self._leave(active, None)
                 self.record(active.work, active.index, active.started, outcome)
 
+    def replace(self, work: Work) -> bool:
+        """Ends the motions that go on, and begins a work in their place; False if anything else goes on."""
+        busy, self._busy = self._busy, True  # nothing else begins between the two
+        try:
+            self.interrupt("aborted", moving_only=True)
+            if self.active or self.frozen_at is not None:
+                return False
+
+            self.aside = self.begin(work)
+            return True
+        finally:
+            self._busy = busy
+
     def thaw(self) -> None:
         """Lets time go on for all that goes on."""
         if self.frozen_at is not None:

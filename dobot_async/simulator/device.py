@@ -215,6 +215,13 @@ class Device:
         self._course.settle()
         return True
 
+    def replace(self, work: Work) -> bool:
+        """Begins an immediate motion in place of the one that goes on; False, without effect, beside anything else."""
+        self.advance()
+        begun = self._course.replace(work)
+        self._course.settle()
+        return begun
+
     def end_aside(self) -> None:
         """Ends a jog where the arm is, as a key that is let go does."""
         self.advance()

@@ -25,10 +25,10 @@ class Oops(Exception):
 
 
 @asynccontextmanager
-async def cell(*names: str, speed: float = 20, **details: object) -> AsyncIterator[dict[str, Simulation]]:
+async def cell(*names: str, speed: float = 20, **details: Any) -> AsyncIterator[dict[str, Simulation]]:
     """Simulated Magicians by name."""
     async with AsyncExitStack() as stack:
-        yield {name: await stack.enter_async_context(simulate(speed=speed, **details)) for name in names}  # type: ignore[arg-type]
+        yield {name: await stack.enter_async_context(simulate(speed=speed, **details)) for name in names}
 
 
 def urls(sims: dict[str, Simulation]) -> dict[str, str]:

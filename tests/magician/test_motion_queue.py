@@ -312,6 +312,7 @@ def test_any_program_is_told_the_truth(
             simulate(options=options, speed=SPEED, faults=Faults(latency=latency)) as sim,
             Magician.connect(sim.url, window=window) as arm,
         ):
+            sim.arm.state.set(c.SET_IO_MULTIPLEXING, c.IOMultiplexing(1, c.IOFunction.PWM))
             program = Program(sim, arm)
             for step in script:
                 await perform(program, step)

@@ -183,7 +183,8 @@ async def test_pause_waits_in_the_middle_of_a_motion_and_resume_goes_on() -> Non
 @virtual
 async def test_stopping_a_paused_arm_makes_it_ready_again() -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
-        sim.arm._end_all = lambda: (sim.arm.device.force_stop(), sim.arm.device.clear(), sim.arm.device.start())
+        simulated: Any = sim.arm
+        simulated._end_all = lambda: (simulated.device.force_stop(), simulated.device.clear(), simulated.device.start())
         motion = await arm.queue.move_joint(1, 150)
         await asyncio.sleep(0.5)
         await arm.pause()
@@ -654,7 +655,8 @@ async def test_a_reopened_line_finds_its_motion_again() -> None:
 @virtual
 async def test_an_arm_that_does_not_stop_is_not_said_to_have_stopped() -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
-        sim.arm.halt = lambda: None
+        simulated: Any = sim.arm
+        simulated.halt = lambda: None
         motion = await arm.queue.move_joint(1, 160, speed=1)
         await asyncio.sleep(1)
         with pytest.raises(MotionUnknown, match="still moves"):

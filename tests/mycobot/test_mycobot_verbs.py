@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -388,7 +388,7 @@ async def test_a_gripper_closes_on_a_piece(quirks: MyCobotQuirks) -> None:
 async def test_a_gripper_that_does_not_open_is_not_open(quirks: MyCobotQuirks) -> None:
     async with simulate("mycobot280", quirks=quirks) as sim, MyCobot.connect(sim.url) as arm:
         go = sim.arm.gripper.go
-        sim.arm.gripper.go = lambda value, speed: go(min(value, 60), speed)
+        cast(Any, sim.arm.gripper).go = lambda value, speed: go(min(value, 60), speed)
         with pytest.raises(MotionStopped, match="came to rest at 60 percent, before it was open to 100"):
             await arm.gripper(False)
 
@@ -439,7 +439,7 @@ async def test_a_gripper_of_which_nothing_is_told_is_unknown() -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
         known = sim.arm.answer
         blind = {c.IS_GRIPPER_MOVING.id, c.GET_GRIPPER_VALUE.id}
-        sim.arm.answer = lambda frame: b"" if frame.id in blind else known(frame)
+        cast(Any, sim.arm).answer = lambda frame: b"" if frame.id in blind else known(frame)
         with pytest.raises(MotionUnknown, match="tells nothing of its gripper"):
             await arm.gripper(False)
 
@@ -494,7 +494,7 @@ async def test_an_arm_that_does_not_pause_is_not_said_to() -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
         await arm.pause()  # it stands, and that is enough
         await arm.resume()
-        sim.arm.pause = lambda: None
+        cast(Any, sim.arm).pause = lambda: None
         await arm.queue.move_joint(1, 150, speed=5)
         await asyncio.sleep(0.5)
         with pytest.raises(CommandRejected, match="Pause: the arm answers, and does not do it"):

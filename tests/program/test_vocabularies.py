@@ -49,7 +49,7 @@ def parsed(arm: str, *lines: str, **options: Any) -> list[tuple[Any, Any]]:
         (["tool saw"], 1, "name is one of suction, gripper, pen, laser, not 'saw'"),
         (["speed 0"], 1, "velocity must be above 0 percent"),
         (["wait -1"], 1, "seconds must be 0 or more"),
-        (["output 99 on"], 1, "address must be in 1 to 20"),
+        (["output 99 on"], 1, "address must be 1 to 20"),
         (["conveyor 1.5"], 1, "speed is a whole number, not '1.5'"),
         (["move 1 2 3 mode=movl mode=movj"], 1, "twice 'mode'"),
     ],
@@ -108,7 +108,7 @@ def test_the_verbs_of_a_mycobot() -> None:
         ("joint 8 0", "has joints 1 to 6, not 8"),
         ("home speed=101", "speed must be in 1 to 100"),
         ("wait nan", "seconds is a number"),
-        ("gripper-to 101", "value must be in 0 to 100"),
+        ("gripper-to 101", "percent must be in 0 (closed) to 100 (open)"),
     ],
 )
 def test_what_a_mycobot_could_not_do_is_refused(line: str, why: str) -> None:

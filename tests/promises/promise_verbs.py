@@ -46,6 +46,10 @@ INTERNAL = frozenset(
         "write_on",
         "writer_ended",
         "perform",
+        "perform_from_goal",
+        "goal",
+        "find_goal",
+        "planned",
         "prepare",
         "put_all",
         "stopping",
@@ -219,6 +223,9 @@ def magician() -> list[Verb]:
     async def alarmed(arm: Any) -> None:
         await arm.queue.move_to(*far)
 
+    async def half_open(place: Any) -> None:
+        await place.gripper_to(50)
+
     return [
         *(read(name) for name in ("get_pose", "get_info", "get_alarms", "get_joints")),
         read("get_rail", prepare=lambda arm: arm.set_rail()),
@@ -227,6 +234,8 @@ def magician() -> list[Verb]:
         read("get_adc", 5, prepare=pin(m.IOFunction.ADC)),
         read("get_color", prepare=lambda arm: arm.set_color_sensor(m.ColorPort.GP1)),
         read("get_infrared", m.InfraredPort.GP1, prepare=lambda arm: arm.set_infrared_sensor(m.InfraredPort.GP1)),
+        read("wait_for_color", prepare=lambda arm: arm.set_color_sensor(m.ColorPort.GP1)),
+        read("wait_for_infrared", m.InfraredPort.GP1, prepare=lambda arm: arm.set_infrared_sensor(m.InfraredPort.GP1)),
         read("set_color_sensor", m.ColorPort.GP1),
         read("set_infrared_sensor", m.InfraredPort.GP1),
         read("set_rail"),
@@ -251,6 +260,10 @@ def magician() -> list[Verb]:
         *two("set_output", 5, True, long=False, prepare=pin(m.IOFunction.DO)),
         *two("set_pwm", 5, 100, 50, long=False, prepare=pin(m.IOFunction.PWM)),
         *two("conveyor", 1000, long=False),
+        *two("conveyor_mm", 10, pulses_per_mm=160, long=False),
+        *two("set_home", 200, 0, 50, long=False),
+        Verb("gripper_to", lambda arm, _: half_open(arm), refused=True),
+        Verb("queue.gripper_to", lambda arm, _: half_open(arm.queue), refused=True),
         *two("set_speed", 50, long=False),
         Verb("queue.put", lambda arm, _: arm.queue.put(m.SET_PTP_CMD, m.PTPCmd(m.PTPMode.MOVJ_XYZ, *far, 0))),
         Verb("queue.download", lambda arm, _: download(arm), LONG, core=True, what="leaving"),
