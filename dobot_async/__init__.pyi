@@ -2,6 +2,7 @@
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.queue.motion import Motion
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.contract import LinkState, LinkStats, Unexpected
 from dobot_async.discovery import DiscoveryProblem, Found, discover
 from dobot_async.errors import (
@@ -17,7 +18,7 @@ from dobot_async.errors import (
 )
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.magician.alarms import Alarm
-from dobot_async.magician.arm import DeviceInfo, Jog, Magician
+from dobot_async.magician.arm import Jog, Magician
 from dobot_async.magician.effectors import Gripper, Laser, Pen, SuctionCup
 from dobot_async.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.magician.params import (

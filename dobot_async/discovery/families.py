@@ -10,9 +10,10 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.errors import CommandRejected, ConnectFailed
 from dobot_async.families import Each
-from dobot_async.magician.arm import DeviceInfo, Magician
+from dobot_async.magician.arm import Magician
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.ultraarm.arm import UltraArm
 

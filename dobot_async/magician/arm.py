@@ -6,7 +6,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
@@ -17,6 +17,7 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.util.arguments import check_duration
 from dobot_async._core.util.tasks import run_concurrently, run_shielded
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.arms.session import arm_session, check_options, open_in_time, run_owned
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped
 from dobot_async.magician import commands as c
@@ -31,7 +32,7 @@ from dobot_async.magician.wifi import WiFi
 from dobot_async.transports import Transport
 from dobot_async.wire import Command, Queueing
 
-__all__ = ["DeviceInfo", "Jog", "Magician"]
+__all__ = ["Jog", "Magician"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
@@ -93,21 +94,6 @@ BARRIERS = (
     c.GET_PTP_COORDINATE_PARAMS,
 )
 """Cheap reads used as barriers: the answer to one proves that earlier requests will not be answered."""
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceInfo:
-    """Who an arm is.
-
-    Attributes:
-        serial_number: The vendor's.
-        name: The user's.
-        version: Of the firmware, "3.2.1".
-    """
-
-    serial_number: str
-    name: str
-    version: str
 
 
 class Magician(Verbs[Coroutine[Any, Any, None]]):

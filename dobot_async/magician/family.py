@@ -9,7 +9,7 @@ __all__ = ["FAMILY"]
 FAMILY = Family(
     public={
         "dobot_async.magician.alarms": ("Alarm",),
-        "dobot_async.magician.arm": ("DeviceInfo", "Jog", "Magician"),
+        "dobot_async.magician.arm": ("Jog", "Magician"),
         "dobot_async.magician.effectors": ("Gripper", "Laser", "Pen", "SuctionCup"),
         "dobot_async.magician.kinematics": ("JointLimits", "Kinematics", "Unreachable"),
         "dobot_async.magician.params": (
