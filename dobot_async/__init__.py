@@ -22,6 +22,7 @@ HOMES = {
         "MotionUnknown",
         "ProtocolError",
         "ReplyTimeout",
+        "UnsupportedError",
     ),
     "fleet.fleet": ("Fleet",),
     "_core.link.link": ("Link",),

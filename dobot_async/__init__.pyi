@@ -15,6 +15,7 @@ from dobot_async.errors import (
     MotionUnknown,
     ProtocolError,
     ReplyTimeout,
+    UnsupportedError,
 )
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.magician.alarms import Alarm
@@ -38,7 +39,7 @@ from dobot_async.mycobot.params import Coords, EndType, GripperType, MoveMode, P
 from dobot_async.mycobot.readings import CobotInfo, CobotPose
 from dobot_async.transports import open_transport
 from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
-from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits
+from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits, UltraArmPose
 from dobot_async.wire import Command
 
 __all__ = [
@@ -93,8 +94,10 @@ __all__ = [
     "UltraArmCoords",
     "UltraArmJog",
     "UltraArmLimits",
+    "UltraArmPose",
     "Unexpected",
     "Unreachable",
+    "UnsupportedError",
     "discover",
     "open_transport",
 ]

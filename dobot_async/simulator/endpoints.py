@@ -9,6 +9,7 @@ calls, and the arm answers.
 from __future__ import annotations
 
 import asyncio
+import inspect
 import itertools
 import math
 import sys
@@ -25,7 +26,7 @@ import anyio
 from dobot_async.errors import ConnectFailed
 from dobot_async.families import Parts
 from dobot_async.simulator.faults import MEANS, PROBABILITIES, TIMES, Channel, Faults, LineState
-from dobot_async.transports.base import MANY, Transport, options
+from dobot_async.transports.base import MANY, Option, Transport, options
 from dobot_async.transports.baud import AtBaud
 from dobot_async.transports.listen import on_tcp, on_udp
 from dobot_async.transports.terminal import on_pty
@@ -37,6 +38,7 @@ MODELS: Parts[Callable[..., Any]] = Parts("simulator")
 BLE_OPTIONS = {"name": str, "address": str, "interval": float, "mtu": int, "packets": int}
 PTY_OPTIONS = {"baud": int}
 FAULT_OPTIONS = dict.fromkeys((*PROBABILITIES, *TIMES, *MEANS), float)
+HOMING = {"homed": Option(lambda text: bool(("false", "true").index(text)), "true or false")}
 SILENCE = 1.0  # seconds after which a client that cannot be seen to leave counts as another one
 BUFFER = 1 << 16
 LEAST_REORDER_WINDOW = 0.005
@@ -372,7 +374,11 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:
 
         return MemoryTransport(simulation)
 
-    given = options(url, {"speed": float, "seed": int, **FAULT_OPTIONS})
+    homing = "homed" in inspect.signature(MODELS[arm]).parameters if arm in MODELS else False
+    given = options(url, {"speed": float, "seed": int, **FAULT_OPTIONS, **(HOMING if homing else {})})
+    if homing:
+        given.setdefault("homed", True)  # for first steps; `simulate()` makes an arm as it is after power-up
+
     faults = Faults(**{name: given.pop(name) for name in FAULT_OPTIONS if name in given})
     async with AsyncExitStack() as stack:
         simulation = await stack.enter_async_context(simulate(arm, faults=faults, **given))

@@ -11,25 +11,22 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from types import MappingProxyType
-from typing import Any, Literal
+from typing import Literal
 
 from dobot_async.errors import CommandRejected
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.answers import Status
 from dobot_async.ultraarm.layouts import Also
+from dobot_async.ultraarm.state import ArmState
 from dobot_async.ultraarm.status import PACE, RESTS, StatusPoller
-from dobot_async.wire import Command
 
 __all__ = ["Stopper"]
 
 BRAKING = 5  # polls of an arm that was told to stop
 GIVING_UP = 50  # polls of an arm without power, after which it counts as one that cannot be stopped
 AGAIN = 10  # polls after which the power is taken off again: some firmware queues that
-POWERING: Mapping[Command[Any, Any], bool] = MappingProxyType({c.RELEASE: True, c.POWER_ON: False})
-"""Whether the motors have no power after a command."""
 STOP_AND_STATUS = replace(c.GET_STATUS, request=Also("M15"), write=True)
 RELEASE_AND_STATUS = replace(c.GET_STATUS, request=Also("M17"), write=True)
 
@@ -39,20 +36,22 @@ class Stopper:
 
     Args:
         status: Polls the arm.
+        state: What is noted of its power.
         on_stop: What to do where M15 does not end a motion.
-
-    Attributes:
-        released: Whether the motors have no power, as far as this program knows.
+        sent: Returns how many requests have gone over the link so far.
     """
 
-    def __init__(self, status: StatusPoller, on_stop: Literal["release", "finish"]) -> None:
-        self.released = False
+    def __init__(
+        self,
+        status: StatusPoller,
+        state: ArmState,
+        on_stop: Literal["release", "finish"],
+        sent: Callable[[], int],
+    ) -> None:
         self._status = status
+        self._state = state
         self._on_stop = on_stop
-
-    def note(self, command: Command[Any, Any]) -> None:
-        """Note what a command that the arm has taken means."""
-        self.released = POWERING.get(command, self.released)
+        self._sent = sent
 
     async def stop(self) -> None:
         """Return when the arm is seen to stand, with nothing in its queue.
@@ -68,28 +67,36 @@ class Stopper:
             while not await self._comes_to_rest(GIVING_UP):
                 pass
         else:
-            self.released = True
+            self._state.note(c.RELEASE, None)
             if not await self._comes_to_rest(GIVING_UP, release=True):
                 raise CommandRejected(
                     f"the arm goes on, with {self._status.size} more commands in its queue: its protocol has nothing "
                     "that ends them; switch it off"
                 )
 
-    async def end_jog(self, queued: Callable[[], bool]) -> None:
+    async def end_jog(self, queued: Callable[[], bool]) -> bool:
         """Return when a jog has ended; stop the arm as `stop` does if M15 does not end it.
 
         Args:
             queued: Returns whether there is something in the arm's queue that goes on, so that standing tells nothing.
+
+        Returns:
+            Whether the arm is known to have stood before it was told to stop.
         """
         self._status.begin()
-        for _ in range(GIVING_UP):
+        sent, stood = self._sent(), False
+        for poll in range(GIVING_UP):
             status = await self._poll(release=False)
+            if not poll:  # M9 is answered before M15 is read; of a second copy it tells nothing
+                stood = status.at_rest and self._sent() == sent + 1
+
             if self._status.rests >= RESTS or status.queue_size or queued():
-                return
+                return stood
 
             await asyncio.sleep(PACE)
 
         await self.stop()
+        return False
 
     async def _comes_to_rest(self, polls: int, *, release: bool = False) -> bool:
         """Return whether the arm rests and has nothing more to do, within so many polls."""
