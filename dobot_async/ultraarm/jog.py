@@ -1,28 +1,29 @@
 """Jogs of an ultraArm: their directions, and how one is begun, watched and ended.
 
-    M9 ... --> at rest? --> M13/M14 --> does it set out? --> (the block) --> M15, until it stands --> did it still move?
+    M9 --> at rest? --> M13/M14 --> does it set out? --> (the block, M9, M9, ...) --> M15, until it stands
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from enum import Enum
 
 from dobot_async._core.queue.executor import alarmed
-from dobot_async._core.util.tasks import Cleanup
-from dobot_async.errors import CommandRejected
+from dobot_async._core.util.tasks import Cleanup, cancel_and_join
+from dobot_async.errors import CommandRejected, DobotError
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.answers import Receipt
 from dobot_async.ultraarm.goals import Fault
 from dobot_async.ultraarm.runner import UltraArmRunner
-from dobot_async.ultraarm.status import PACE, STATUS_AND_ANGLES
+from dobot_async.ultraarm.status import PACE, RESTS, STATUS_AND_ANGLES
 from dobot_async.wire import Command
 
 __all__ = ["Jogger", "UltraArmJog", "direction_of"]
 
 SETS_OUT = 0.5  # seconds within which an arm sets out
+SELDOM = 0.05  # seconds between two looks at a jog
 BLOCKED = Fault("the jog did not set out: at the end of its way, not homed, or without power")
 RAN_OUT = Fault("the jog came to the end of its way before it was to end")
 
@@ -69,7 +70,8 @@ class Jogger:
     def __init__(self, runner: UltraArmRunner, cleanup: Cleanup) -> None:
         self._runner = runner
         self._cleanup = cleanup
-        self._stood = False
+        self._watch: asyncio.Task[None] | None = None
+        self._ran_out = False
 
     @asynccontextmanager
     async def jogging(self, command: Command[c.JogMove, Receipt], value: c.JogMove) -> AsyncIterator[None]:
@@ -79,7 +81,7 @@ class Jogger:
         if runner.jogging:
             raise CommandRejected("another jog goes on: end it first")
 
-        runner.jogging = True
+        runner.jogging, self._ran_out = True, False
         try:
             status = await runner.status.poll(STATUS_AND_ANGLES)
             if status.queue_size or not status.at_rest:
@@ -89,12 +91,15 @@ class Jogger:
                 runner.status.begin()
                 await runner.ask(command, value)
                 await self._sets_out()
+                self._watch = asyncio.create_task(self._look_on(), name="dobot_async jog")
                 yield
         finally:
             runner.jogging = False
             runner.disturbed()
+            if self._watch:
+                await cancel_and_join(self._watch)
 
-        if self._stood:
+        if self._ran_out:
             raise alarmed([RAN_OUT])
 
     async def end(self) -> None:
@@ -103,7 +108,20 @@ class Jogger:
 
     async def _end(self) -> None:
         """End the jog of a block."""
-        self._stood = await self._runner.stopper.end_jog(lambda: False)
+        if self._watch:
+            self._watch.cancel()
+
+        await self._runner.stopper.end_jog(lambda: False)
+
+    async def _look_on(self) -> None:
+        """Note if the arm comes to rest before it is told to; what a silent line is told about is the end of the jog."""
+        status = self._runner.status
+        status.begin()
+        with suppress(DobotError):
+            while not self._ran_out:
+                await asyncio.sleep(SELDOM)
+                await status.poll(c.GET_STATUS)
+                self._ran_out = status.rests >= RESTS
 
     async def _sets_out(self) -> None:
         """Return when the arm is seen to move; raise ArmAlarm if it does not."""

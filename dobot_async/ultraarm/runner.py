@@ -71,7 +71,7 @@ class UltraArmRunner:
         self.channel = Channel(link)
         self.state = ArmState()
         self.status = StatusPoller(self.channel.read)
-        self.stopper = Stopper(self.status, self.state, on_stop, lambda: link.stats.sent)
+        self.stopper = Stopper(self.status, self.state, on_stop)
         self.busy = self.jogging = False
         self._link = link
         self._limits = limits

@@ -38,20 +38,12 @@ class Stopper:
         status: Polls the arm.
         state: What is noted of its power.
         on_stop: What to do where M15 does not end a motion.
-        sent: Returns how many requests have gone over the link so far.
     """
 
-    def __init__(
-        self,
-        status: StatusPoller,
-        state: ArmState,
-        on_stop: Literal["release", "finish"],
-        sent: Callable[[], int],
-    ) -> None:
+    def __init__(self, status: StatusPoller, state: ArmState, on_stop: Literal["release", "finish"]) -> None:
         self._status = status
         self._state = state
         self._on_stop = on_stop
-        self._sent = sent
 
     async def stop(self) -> None:
         """Return when the arm is seen to stand, with nothing in its queue.
@@ -74,29 +66,21 @@ class Stopper:
                     "that ends them; switch it off"
                 )
 
-    async def end_jog(self, queued: Callable[[], bool]) -> bool:
+    async def end_jog(self, queued: Callable[[], bool]) -> None:
         """Return when a jog has ended; stop the arm as `stop` does if M15 does not end it.
 
         Args:
             queued: Returns whether there is something in the arm's queue that goes on, so that standing tells nothing.
-
-        Returns:
-            Whether the arm is known to have stood before it was told to stop.
         """
         self._status.begin()
-        sent, stood = self._sent(), False
-        for poll in range(GIVING_UP):
+        for _ in range(GIVING_UP):
             status = await self._poll(release=False)
-            if not poll:  # M9 is answered before M15 is read; of a second copy it tells nothing
-                stood = status.at_rest and self._sent() == sent + 1
-
             if self._status.rests >= RESTS or status.queue_size or queued():
-                return stood
+                return
 
             await asyncio.sleep(PACE)
 
         await self.stop()
-        return False
 
     async def _comes_to_rest(self, polls: int, *, release: bool = False) -> bool:
         """Return whether the arm rests and has nothing more to do, within so many polls."""

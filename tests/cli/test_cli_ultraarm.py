@@ -128,7 +128,7 @@ def test_a_gcode_file(tmp_path: Path) -> None:
 
 
 async def test_suction_and_stop_leave_the_rest_alone() -> None:
-    async with simulate("ultraarm", listen="tcp://127.0.0.1:0", speed=50) as sim:
+    async with simulate("ultraarm", homed=True, listen="tcp://127.0.0.1:0", speed=50) as sim:
 
         async def run(*arguments: str) -> str:
             command = (sys.executable, "-W", "error", "-m", "dobot_async", "--arm", "ultraarm", "--url", sim.url)

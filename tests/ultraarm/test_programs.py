@@ -138,8 +138,8 @@ def test_any_program(steps: list[tuple[str, int, float]], acknowledge: Any, dept
         options = DeviceOptions(10, False, 1, 0, power_up_alarms=frozenset())
         faults = Faults(loss=loss)
         async with (
-            simulate("ultraarm", quirks=quirks, options=options, faults=faults, seed=seed, speed=5) as sim,
-            UltraArm.connect(sim.url, depth=depth, timeout=30) as arm,
+            simulate("ultraarm", homed=True, quirks=quirks, options=options, faults=faults, seed=seed, speed=5) as sim,
+            UltraArm.connect(sim.url, timeout=30) as arm,
         ):
             program = Program(sim, arm)
             for step in steps:

@@ -50,7 +50,7 @@ async def bridged(
     listen: str | list[str] = TCP, *, speed: float = 20.0, quirks: UltraArmQuirks = PLAIN, **details: Any
 ) -> AsyncIterator[Rig]:
     async with (
-        simulate("ultraarm", listen=TCP, speed=speed, quirks=quirks) as sim,
+        simulate("ultraarm", homed=True, listen=TCP, speed=speed, quirks=quirks) as sim,
         over(sim.url, listen, **details) as (running, happened),
     ):
         yield Rig(sim, running, happened)
@@ -129,8 +129,9 @@ async def test_others_watch_while_one_moves_and_hear_that_they_may_not_move(ackn
     async with bridged(quirks=UltraArmQuirks(acknowledge=acknowledge)) as rig, UltraArm.connect(rig.bridge.url) as arm:
         async with UltraArm.connect(rig.bridge.url) as other:
             motion = await arm.queue.move_to(200, 100, 40)
+            await until(lambda: rig.sim.arm.device.moving)
             with pytest.raises(CommandRejected, match="moves the arm"):
-                await other.queue.move_to(200, 0, 40)
+                await other.request(c.PUMP_ON, None)
 
             assert (await other.get_coords()).x > 0
             assert not (await other.get_angles()).j4

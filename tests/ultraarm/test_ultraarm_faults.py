@@ -237,7 +237,7 @@ def test_many_moves_on_a_terrible_line(seed: int, acknowledge: Any) -> None:
         options = DeviceOptions(20, False, 1, 0, power_up_alarms=frozenset())
         quirks = UltraArmQuirks(acknowledge=acknowledge)
         async with (
-            simulate("ultraarm", faults=faults, seed=seed, speed=20, options=options, quirks=quirks) as sim,
+            simulate("ultraarm", homed=True, faults=faults, seed=seed, speed=20, options=options, quirks=quirks) as sim,
             UltraArm.connect(sim.url, timeout=30) as arm,
         ):
             wanted = [180 + step / 4 for step in range(150)]
@@ -252,7 +252,7 @@ def test_many_moves_on_a_terrible_line(seed: int, acknowledge: Any) -> None:
 
 @virtual
 async def test_a_link_that_is_reopened_goes_on() -> None:
-    async with simulate("ultraarm", speed=5) as sim, UltraArm.connect(sim.url, reconnect=True) as arm:
+    async with simulate("ultraarm", homed=True, speed=5) as sim, UltraArm.connect(sim.url, reconnect=True) as arm:
         motions = [await arm.queue.move_to(200 + 10 * step, 0, 40) for step in range(4)]
         sim.unplug()
         for motion in motions:
@@ -264,7 +264,7 @@ async def test_a_link_that_is_reopened_goes_on() -> None:
 
 @virtual
 async def test_an_arm_that_was_switched_off_meanwhile_is_noticed() -> None:
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url, reconnect=True) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url, reconnect=True) as arm:
         motions = [await arm.queue.move_to(200 + 10 * step, 0, 40, speed=10) for step in range(4)]
         sim.arm.power_cycle()
         sim.unplug()
