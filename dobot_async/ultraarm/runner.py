@@ -25,7 +25,7 @@ from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.answers import Receipt, Status
 from dobot_async.ultraarm.channel import Channel
 from dobot_async.ultraarm.frame import Frame
-from dobot_async.ultraarm.goals import GRAIN, INCREMENTS, Goal, PointGoal, goal_of, summed
+from dobot_async.ultraarm.goals import GRAIN, INCREMENTS, Fault, Goal, PointGoal, goal_of, summed
 from dobot_async.ultraarm.state import ArmState
 from dobot_async.ultraarm.status import RESTS, STATUS_AND_ANGLES, StatusPoller
 from dobot_async.ultraarm.stopper import Stopper
@@ -70,7 +70,7 @@ class UltraArmRunner:
     ) -> None:
         self.channel = Channel(link)
         self.state = ArmState()
-        self.status = StatusPoller(self.channel.read)
+        self.status = StatusPoller(self.channel.read, lambda: link.stats)
         self.stopper = Stopper(self.status, self.state, on_stop)
         self.busy = self.jogging = False
         self._link = link
@@ -210,17 +210,25 @@ class UltraArmRunner:
             await self.status.poll(STATUS_AND_ANGLES)  # to see by it whether something moves
 
         goal = goal_of(command, value, self._home_switches)
-        outages = self._link.outages
+        outages, fault = self._link.outages, None
         self._idle = False
         for _ in range(TRIES):
             self.status.begin(goal)
             before = self.status.last
             receipt = await self.channel.send(command, value)
             if self._acknowledged(receipt) or await self._has_begun(goal, before):
-                await self._arrive(goal)
-                break
+                fault = await self._arrive(goal)
+                if fault is None:
+                    break
+
+                if self.status.set_out or self.status.is_in_order:
+                    raise alarmed([fault])  # else what acknowledged it may have been an answer to another one
         else:
-            raise MotionUnknown(f"the arm does not acknowledge {command.name}, sent {TRIES} times, and does not move")
+            raise (
+                alarmed([fault])
+                if fault
+                else MotionUnknown(f"the arm does not acknowledge {command.name}, sent {TRIES} times, and does not move")
+            )
 
         if command is c.HOME and outages != self._link.outages:
             raise MotionUnknown("the link was lost, and nothing tells whether the arm was switched off meanwhile")
@@ -246,18 +254,18 @@ class UltraArmRunner:
 
         return (c.MOVE_LINE if command is c.MOVE_LINE else c.MOVE_COORDS), target
 
-    async def _arrive(self, goal: Goal) -> None:
-        """Return when the arm rests at a goal; raise ArmAlarm if it rests elsewhere."""
+    async def _arrive(self, goal: Goal) -> Fault | None:
+        """Return when the arm rests at a goal, or elsewhere: then what is wrong."""
         while True:
             status = await self.status.poll_paced()
             if not self.status.is_at_rest:
                 continue
 
             if goal.reached(status, self._tolerance, set_out=self.status.set_out):
-                return
+                return None
 
             if self.status.now() >= self.status.rest_since + SETTLED and self.status.rests >= RESTS:
-                raise alarmed([goal.missed(status, set_out=self.status.set_out)])
+                return goal.missed(status, set_out=self.status.set_out)
 
     async def _has_begun(self, goal: Goal, before: Status | None) -> bool:
         """Return whether an arm that has not acknowledged a motion does it, or has done it."""

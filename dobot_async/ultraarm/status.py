@@ -1,7 +1,7 @@
 """What an ultraArm shows of itself: polls, one after the other, and what they say together.
 
 poll         M9 (M12), M120, M119, M114: does it move, its joints, how much waits, its switches, its place
-rests        so many polls in a row at which it rests, with nothing waiting
+rests        so many polls in a row at which it rests at the same place, with nothing waiting
 ends_at      when it will be where it is to go, if it goes on as it does
 """
 
@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import Any
 
 from dobot_async._core.queue.executor import alarmed
+from dobot_async.contract import LinkStats
 from dobot_async.errors import ProtocolError, ReplyTimeout
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.answers import Status
@@ -27,7 +28,7 @@ __all__ = ["PACE", "RESTS", "SILENCE", "STATUS_AND_ANGLES", "StatusPoller"]
 SILENCE = 5.0  # seconds without an answer after which what the arm does cannot be seen any more
 PACE = 0.02  # seconds between two polls of an arm that moves
 DENSE = 0.003  # seconds between two polls at the least
-RESTS = 2  # polls in a row at which it rests; one is enough behind a poll at which it moved
+RESTS = 2  # polls in a row at which it rests; one is enough behind one at which it moved, on a line that lost nothing
 SOON = 0.15  # seconds before the end of a motion from when on it is polled without a pause
 STATUS_AND_ANGLES = replace(c.GET_STATUS, request=Also("M12"))
 
@@ -37,6 +38,7 @@ class StatusPoller:
 
     Args:
         read: Reads a row, and raises ReplyTimeout if the arm is silent.
+        stats: Returns what has happened on the line so far.
 
     Attributes:
         size: How many commands wait in the arm's queue, as far as is known.
@@ -47,13 +49,14 @@ class StatusPoller:
         set_out: Whether it was seen to move, or to stand otherwise than before, since `begin`.
     """
 
-    def __init__(self, read: Callable[..., Awaitable[Any]]) -> None:
+    def __init__(self, read: Callable[..., Awaitable[Any]], stats: Callable[[], LinkStats]) -> None:
         self.size = 0
         self.last: Status | None = None
         self.rests = 0
         self.rest_since = -math.inf
         self.busy = self.set_out = False
         self._read = read
+        self._stats = stats
         self._goal: Goal | None = None
         self._before: Status | None = None
         self._polled_at = self._rested_at = -math.inf
@@ -64,7 +67,13 @@ class StatusPoller:
     @property
     def is_at_rest(self) -> bool:
         """Whether the arm rests, often enough."""
-        return self.rests >= (1 if self._moved else RESTS)
+        return self.rests >= (1 if self._moved and self.is_in_order else RESTS)
+
+    @property
+    def is_in_order(self) -> bool:
+        """Whether no answer was overdue so far: one that was may still come, and pass for one of now."""
+        stats = self._stats()
+        return not (stats.repeated or stats.timeouts or stats.unexpected)
 
     def begin(self, goal: Goal | None = None) -> None:
         """The arm has, or may have, something new to do."""
@@ -111,15 +120,17 @@ class StatusPoller:
 
         now = self._polled_at = self.now()
         self.size = status.queue_size
-        self.last = status
+        before, self.last = self.last, status
         self._expect(status)
         if not status.at_rest or status.queue_size:
             self.rests = 0
             self._moved = not status.at_rest
             self.busy = True
-        elif now >= self._rested_at + PACE / 2 or not self.rests:
+        elif not self.rests or now >= self._rested_at + PACE / 2:
+            if not self.rests or (before and moved(before, status)):  # one of the two is not of now
+                self.rests, self.rest_since = 0, now
+
             self._rested_at = now
-            self.rest_since = self.rest_since if self.rests else now
             self.rests += 1
 
         self.set_out = self.set_out or not status.at_rest or (self._before is not None and moved(self._before, status))
