@@ -116,7 +116,9 @@ class Registers:
         came_from, set_out, speed = self.stroke
         target = float(self.gripper or 0)
         way = target - came_from
-        return target if abs(way) <= speed * (now - set_out) else came_from + math.copysign(speed * (now - set_out), way)
+        return (
+            target if abs(way) <= speed * (now - set_out) else came_from + math.copysign(speed * (now - set_out), way)
+        )
 
 
 Move = Callable[[Registers, Vector, Any], Activity]

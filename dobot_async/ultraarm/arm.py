@@ -62,9 +62,7 @@ class UltraArm(Verbs[Coroutine[Any, Any, None]]):
         self.link = link
         self.limits = limits
         self.pump = pump
-        self._runner = UltraArmRunner(
-            link, limits, tolerance=tolerance, home_switches=home_switches, on_stop=on_stop
-        )
+        self._runner = UltraArmRunner(link, limits, tolerance=tolerance, home_switches=home_switches, on_stop=on_stop)
         self._executor = HostExecutor(self._runner, link.cleanup)
         self._jogger = Jogger(self._runner, link.cleanup)
         self.queue = UltraArmQueue(self._executor, pump)

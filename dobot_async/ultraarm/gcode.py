@@ -65,7 +65,7 @@ class GCodeLine:
     value: Any
 
     def __str__(self) -> str:
-        return f"line {self.number} ({self.text})"
+        return f"line {self.number} ({self.text})" if self.number else f"the program's own {self.text}"
 
 
 def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> tuple[GCodeLine, ...]:

@@ -1,8 +1,8 @@
 """Where a motion leads, and whether the arm stands there: it says nothing itself of a motion that it does not do.
 
-    G0 X200    -> coords (x 200)          compared with M114, within the tolerance
-    M11 X20    -> joints (j1 20)          compared with M12
-    G28        -> home                    compared with M119: the home switches; and something has moved
+G0 X200    -> coords (x 200)          compared with M114, within the tolerance
+M11 X20    -> joints (j1 20)          compared with M12
+G28        -> home                    compared with M119: the home switches; and something has moved
 """
 
 from __future__ import annotations
@@ -15,7 +15,19 @@ from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.answers import Status
 from dobot_async.wire import Command
 
-__all__ = ["AXES", "GRAIN", "INCREMENTS", "Fault", "Goal", "HomeGoal", "PointGoal", "goal_of", "moved", "pose_of", "summed"]
+__all__ = [
+    "AXES",
+    "GRAIN",
+    "INCREMENTS",
+    "Fault",
+    "Goal",
+    "HomeGoal",
+    "PointGoal",
+    "goal_of",
+    "moved",
+    "pose_of",
+    "summed",
+]
 
 GRAIN = 0.02  # mm and degrees; the arm tells hundredths
 AXES = ("x", "y", "z", "e")

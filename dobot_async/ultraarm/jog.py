@@ -1,6 +1,6 @@
 """Jogs of an ultraArm: their directions, and how one is begun, watched and ended.
 
-    M9 --> at rest? --> M13/M14 --> does it set out? --> (the block, M9, M9, ...) --> M15, until it stands
+M9 --> at rest? --> M13/M14 --> does it set out? --> (the block, M9, M9, ...) --> M15, until it stands
 """
 
 from __future__ import annotations

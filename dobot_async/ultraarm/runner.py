@@ -216,7 +216,7 @@ class UltraArmRunner:
             self.status.begin(goal)
             before = self.status.last
             receipt = await self.channel.send(command, value)
-            if self._acknowledged(receipt) or await self._has_begun(goal, before):
+            if self._acknowledged(command, receipt) or await self._has_begun(goal, before):
                 fault = await self._arrive(goal)
                 if fault is None:
                     break
@@ -227,7 +227,9 @@ class UltraArmRunner:
             raise (
                 alarmed([fault])
                 if fault
-                else MotionUnknown(f"the arm does not acknowledge {command.name}, sent {TRIES} times, and does not move")
+                else MotionUnknown(
+                    f"the arm does not acknowledge {command.name}, sent {TRIES} times, and does not move"
+                )
             )
 
         if command is c.HOME and outages != self._link.outages:
@@ -235,7 +237,9 @@ class UltraArmRunner:
 
         self._idle = True
 
-    async def _resolved(self, command: Command[Any, Any], value: c.CoordsMove) -> tuple[Command[Any, Any], c.CoordsMove]:
+    async def _resolved(
+        self, command: Command[Any, Any], value: c.CoordsMove
+    ) -> tuple[Command[Any, Any], c.CoordsMove]:
         """Return a motion whose coordinates are places; let the arm take them for places."""
         if not self._absolute:
             await self._set(c.ABSOLUTE, None)
@@ -314,7 +318,7 @@ class UltraArmRunner:
         """Send what may be sent again until the arm acknowledges it."""
         for _ in range(TRIES):
             receipt = await self.channel.send(command, value)
-            if receipt and self._acknowledged(receipt):
+            if receipt and self._acknowledged(command, receipt):
                 self.status.size = receipt.queue_size
                 return receipt
 
@@ -322,17 +326,15 @@ class UltraArmRunner:
 
         raise MotionUnknown(f"the arm does not acknowledge {command.name}, sent {TRIES} times")
 
-    def _acknowledged(self, receipt: Receipt | None) -> bool:
+    def _acknowledged(self, command: Command[Any, Any], receipt: Receipt | None) -> bool:
         """Return whether an answer acknowledges a command: if the arm usually says something to one, it has to."""
-        if receipt is None:
+        if receipt is None or (not receipt.text and self._says_ok):
             self._says_ok = None  # to be learnt again
             return False
 
-        if not receipt.text and self._says_ok:
-            self._says_ok = None
-            return False
+        if command is not c.HOME:  # to which all firmware says something
+            self._says_ok = bool(receipt.text)
 
-        self._says_ok = bool(receipt.text)
         return True
 
 

@@ -86,7 +86,10 @@ async def test_an_await_returns_when_the_arm_has_arrived(quirks: UltraArmQuirks)
 @virtual
 async def test_no_motion_is_done_before_its_time(quirks: UltraArmQuirks, count_executing: bool) -> None:
     options = queue(100, count_executing=count_executing)
-    async with simulate("ultraarm", homed=True, quirks=quirks, options=options) as sim, UltraArm.connect(sim.url) as arm:
+    async with (
+        simulate("ultraarm", homed=True, quirks=quirks, options=options) as sim,
+        UltraArm.connect(sim.url) as arm,
+    ):
         motions = []
         for step in range(12):
             motions.append(await arm.queue.move_to(200 + step, 0, 40))
@@ -327,7 +330,6 @@ async def test_a_stop_of_an_arm_at_rest_releases_nothing() -> None:
 @virtual
 async def test_a_stop_may_let_the_arm_finish() -> None:
     async with simulate("ultraarm", homed=True, speed=20) as sim, UltraArm.connect(sim.url, on_stop="finish") as arm:
-
         motions = [await arm.queue.move_to(200 + step, 0, 40) for step in range(10)]
         await asyncio.sleep(0.05)
         await arm.stop()
@@ -487,7 +489,6 @@ async def test_every_row_can_be_asked() -> None:
 
         with pytest.raises(ValueError, match="cannot be queued"):
             await arm.queue.put(c.GET_ANGLES, None)
-
 
 
 @virtual
@@ -669,7 +670,10 @@ async def test_over_a_serial_port() -> None:
 
 
 async def test_over_tcp_and_by_its_own_simulation() -> None:
-    async with simulate("ultraarm", homed=True, listen="tcp://127.0.0.1:0", speed=50) as sim, UltraArm.connect(sim.url) as arm:
+    async with (
+        simulate("ultraarm", homed=True, listen="tcp://127.0.0.1:0", speed=50) as sim,
+        UltraArm.connect(sim.url) as arm,
+    ):
         await arm.move_to(200, 0, 40)
 
     async with UltraArm.connect("sim:?speed=50") as arm:
