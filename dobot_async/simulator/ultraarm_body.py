@@ -98,7 +98,7 @@ class Registers:
     speed_mode: int = 2
     servo: dict[tuple[int, int], int] = field(default_factory=dict)
     closed: int = 20
-    stroke: tuple[float, float, float] = (0.0, 0.0, math.inf)
+    stroke: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def release(self, joints: Vector) -> None:
         """Takes the power off the motors, where the joints are: it forgets where that is."""

@@ -38,7 +38,7 @@ INCREMENTS = frozenset({c.MOVE_COORDS, c.MOVE_LINE})
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What keeps an ultraArm from a motion, or has ended it: no alarm of its own, for it has none, but what was seen."""
+    """What keeps an ultraArm from a motion, or has ended it: what was seen, for it has no alarms of its own."""
 
     text: str
 

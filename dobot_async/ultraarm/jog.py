@@ -114,7 +114,7 @@ class Jogger:
         await self._runner.stopper.end_jog(lambda: False)
 
     async def _look_on(self) -> None:
-        """Note if the arm comes to rest before it is told to; what a silent line is told about is the end of the jog."""
+        """Note if the arm comes to rest before it is told to; of a silent line the end of the jog tells."""
         status = self._runner.status
         status.begin()
         with suppress(DobotError):

@@ -73,10 +73,11 @@ class Verbs(Generic[T]):
             timeout: Seconds.
         """
         if isinstance(x, (c.UltraArmPose, c.UltraArmCoords)):
-            if not y is z is e is None:
+            if not (y is None and z is None and e is None):
                 raise ValueError("give a pose, or coordinates, not both")
 
-            x, y, z, e = x.x, x.y, x.z, x.e
+            pose = x
+            x, y, z, e = pose.x, pose.y, pose.z, pose.e
 
         return self.perform(c.MOVE_COORDS, c.CoordsMove(*some(x, y, z, e), f=check_speed(speed)), timeout)
 

@@ -8,7 +8,7 @@ trouble out of reach, no power, not homed, at a limit, the line dead or standing
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine, Iterator
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -107,16 +107,22 @@ async def batched(arm: UltraArm, each: Verb) -> None:
 
 
 async def as_gcode(arm: UltraArm, each: Verb) -> None:
-    try:
-        await arm.run_gcode([*each.lines, "M23"])
-    except DobotError as error:
-        known = isinstance(error, (ArmAlarm, CommandRejected))
+    program = asyncio.ensure_future(run(arm, [*each.lines, "M23"]))
+    (failure,) = await asyncio.gather(program, return_exceptions=True)
+    if isinstance(failure, DobotError):
+        known = isinstance(failure, (ArmAlarm, CommandRejected))
         named = [f"line {len(each.lines)} "] if known else ["line 1 ", "line 2 ", "the program's own G90"]
-        assert error.__notes__[0].startswith(tuple(named)), "the line that failed is named"
-        raise
+        assert failure.__notes__[0].startswith(tuple(named)), "the line that failed is named"
+
+    if isinstance(failure, BaseException):
+        raise failure
 
 
-def failed_alike(results: list[Any]) -> None:
+async def run(arm: UltraArm, lines: list[str]) -> None:
+    await arm.run_gcode(lines)
+
+
+def failed_alike(results: Sequence[Any]) -> None:
     """What is behind a motion that has failed has not been done either."""
     motion, behind = results
     if isinstance(motion, BaseException):

@@ -279,14 +279,14 @@ async def test_after_a_stop_that_released_the_motors_nothing_moves_until_the_arm
         await asyncio.sleep(0.1)
         await arm.stop()
         assert not sim.arm.registers.powered
-        calls: list[Callable[[], Awaitable[object]]] = [
+        calls: list[Callable[[], Awaitable[Any]]] = [
             lambda: arm.queue.move_to(200, 0, 40),
             lambda: arm.move_by(z=5),
             lambda: arm.move_joints(0, 10, 10),
             lambda: arm.jog("x+", 0.1),
-            lambda: arm.run_gcode(["G0 X200"])._run(),
+            lambda: arm.run_gcode(["G0 X200"]),
         ]
-        for call in (*calls, lambda: arm.home()):
+        for call in [*calls, arm.home]:
             with pytest.raises(CommandRejected, match="no power"):
                 await call()
 
