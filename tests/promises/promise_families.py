@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AbstractAsyncContextManager
-from dataclasses import dataclass
-from types import MappingProxyType
+from dataclasses import dataclass, field
 from typing import Any
 
 from dobot_async import Jog, Magician, MyCobot, UltraArm, UltraArmJog
@@ -42,7 +41,7 @@ class Family:
     jog: Any
     read: Callable[[Any], Awaitable[Any]]
     slow: float
-    details: Mapping[str, Any] = MappingProxyType({})
+    details: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def connect(self, url: str, **options: Any) -> AbstractAsyncContextManager[Any]:
         """Its `connect`."""
@@ -83,7 +82,7 @@ FAMILIES = (
         jog=UltraArmJog.J1_PLUS,
         read=lambda arm: arm.get_angles(),
         slow=0.02,
-        details=MappingProxyType({"homed": True}),
+        details={"homed": True},
     ),
 )
 BY_NAME = {family.name: family for family in FAMILIES}
