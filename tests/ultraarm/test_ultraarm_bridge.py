@@ -526,3 +526,18 @@ def test_a_watch_knows_what_moves_and_what_burns() -> None:
     assert watch.moving(rest)
     watch.sent(Line(b"M5\r"))
     assert not watch.moving(rest)
+
+
+@pytest.mark.parametrize("cut", range(1, 12))
+@pytest.mark.parametrize("token", [b"TOKEN abc\n", b""])
+def test_a_token_that_nobody_asked_for_spoils_no_command(token: bytes, cut: int) -> None:
+    stream = token + b"M120\rT\rG0 X200\r"
+    parser = Requests()
+    found = [*parser.feed(stream[:cut]), *parser.feed(stream[cut:])]
+    assert [line.text for line in found] == [b"M120\r", b"T\r", b"G0 X200\r"]
+
+
+async def test_a_client_with_a_token_at_a_bridge_without_one() -> None:
+    async with bridged() as rig, UltraArm.connect(f"{rig.bridge.url}?token=abc") as arm:
+        assert (await arm.get_coords()).x > 0
+        assert arm.link.stats.repeated == arm.link.stats.unexpected == 0
