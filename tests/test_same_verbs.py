@@ -45,7 +45,9 @@ class Family:
     far: tuple[float, ...]
     read: Command[None, Any]
     where: Callable[[Any], tuple[float, ...]]
-    details: Mapping[str, Any] = field(default_factory=dict, compare=False)  # what `simulate` needs, so that the arm can move
+    details: Mapping[str, Any] = field(
+        default_factory=dict, compare=False
+    )  # what `simulate` needs, so that the arm can move
 
     def connect(self, url: str, **options: Any) -> AbstractAsyncContextManager[Any]:
         """The `connect` of its class."""
@@ -195,7 +197,10 @@ async def test_an_error_in_the_block_stops_the_arm(family: Family) -> None:
 
 @each_family
 async def test_observers_send_reads_alone(family: Family) -> None:
-    async with simulate(family.model, speed=FAST, **family.details) as sim, family.connect(sim.url, control=False) as arm:
+    async with (
+        simulate(family.model, speed=FAST, **family.details) as sim,
+        family.connect(sim.url, control=False) as arm,
+    ):
         await arm.request(family.read, None)
         with pytest.raises(ValueError, match="only reads"):
             await arm.queue.move_joints(*family.far)

@@ -19,7 +19,7 @@ Q = TypeVar("Q")
 
 
 class UltraArmQueue(HostQueue, Verbs[Coroutine[Any, Any, Motion]]):
-    """What is put here the arm is given in order, each once the one before it was seen to be done; for each a Motion."""
+    """What is put here the arm is given in order, each once the one before it was seen to be done."""
 
     def __init__(self, executor: HostExecutor, pump: Pump) -> None:
         super().__init__(executor)

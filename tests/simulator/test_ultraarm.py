@@ -169,7 +169,7 @@ def test_when_m17_releases(release: str, left: int) -> None:
     assert not bench.arm.registers.powered
     bench("M18\rG0 X230\r")
     bench.now = 2000
-    assert (bench.arm.missed, bench.arm.pose.x) == (1, pytest.approx(bench.arm.pose.x)), "it does not know where it is"
+    assert bench.arm.missed == 1, "it does not know where it is"
     bench("G28\rG0 X230\r")
     bench.now = 3000
     assert bench.arm.pose.x == pytest.approx(230)
