@@ -15,19 +15,17 @@ from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.queue.host import HostExecutor
 from dobot_async._core.util.arguments import check_choice, check_duration, check_timeout
 from dobot_async._core.util.tasks import STAYING
-from dobot_async.arms.info import DeviceInfo
 from dobot_async.arms.session import arm_session, check_options, run_owned
 from dobot_async.errors import CommandRejected, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.transports import Transport
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.frame import BARRIERS, Frame, Parser, encode
 from dobot_async.ultraarm.gcode import GCodeRun, Source, parse_gcode
-from dobot_async.ultraarm.goals import Fault, pose_of
 from dobot_async.ultraarm.jog import Jogger, UltraArmJog, direction_of
 from dobot_async.ultraarm.opening import opened, silent
 from dobot_async.ultraarm.queue import UltraArmQueue
+from dobot_async.ultraarm.readings import Readings
 from dobot_async.ultraarm.runner import UltraArmRunner
-from dobot_async.ultraarm.status import STATUS_AND_ANGLES
 from dobot_async.ultraarm.tools import darken
 from dobot_async.ultraarm.verbs import SPEED, Pump, Verbs, check_speed
 from dobot_async.wire import Command, Queueing
@@ -38,7 +36,7 @@ Q = TypeVar("Q")
 R = TypeVar("R")
 
 
-class UltraArm(Verbs[Coroutine[Any, Any, None]]):
+class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
     """An ultraArm P340; made by `connect`. Each verb returns when the arm has done it.
 
     A command belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
@@ -63,6 +61,7 @@ class UltraArm(Verbs[Coroutine[Any, Any, None]]):
         self.limits = limits
         self.pump = pump
         self._runner = UltraArmRunner(link, limits, tolerance=tolerance, home_switches=home_switches, on_stop=on_stop)
+        super().__init__(self._runner)
         self._executor = HostExecutor(self._runner, link.cleanup)
         self._jogger = Jogger(self._runner, link.cleanup)
         self.queue = UltraArmQueue(self._executor, pump)
@@ -170,62 +169,6 @@ class UltraArm(Verbs[Coroutine[Any, Any, None]]):
         self.limits.check(value)
         self._runner.state.check(command)
         return await self._runner.ask(command, value, timeout=timeout)
-
-    async def get_pose(self, *, timeout: float | None = None) -> c.UltraArmPose:
-        """Return where the arm is: the tool, mm, and the joints, degrees, read at one time. Manual 5, M12 and M114."""
-        return pose_of(await self._runner.ask(STATUS_AND_ANGLES, None, timeout=timeout))
-
-    async def get_joints(self, *, timeout: float | None = None) -> tuple[float, ...]:
-        """Return the four joints, degrees; the fourth is 0 where nothing is mounted on it. Manual 5, M12."""
-        found = await self.get_angles(timeout=timeout)
-        return (found.j1, found.j2, found.j3, found.j4)
-
-    async def get_angles(self, *, timeout: float | None = None) -> c.UltraArmAngles:
-        """Return the joints, degrees. Manual 5, M12."""
-        return await self._runner.ask(c.GET_ANGLES, None, timeout=timeout)
-
-    async def get_coords(self, *, timeout: float | None = None) -> c.UltraArmCoords:
-        """Return where the tool is, mm, and the fourth joint, degrees. Manual 5, M114."""
-        return await self._runner.ask(c.GET_COORDS, None, timeout=timeout)
-
-    async def get_endstops(self, *, timeout: float | None = None) -> c.Endstops:
-        """Return the home switches. Manual 5, M119."""
-        return await self._runner.ask(c.GET_ENDSTOPS, None, timeout=timeout)
-
-    async def get_queue_size(self, *, timeout: float | None = None) -> int:
-        """Return how many commands wait in the arm's queue."""
-        return (await self._runner.ask(c.GET_QUEUE_SIZE, None, timeout=timeout)).queue_size
-
-    async def is_moving(self, *, timeout: float | None = None) -> bool:
-        """Return whether the arm moves."""
-        return not (await self._runner.ask(c.GET_STATUS, None, timeout=timeout)).at_rest
-
-    async def get_version(self, *, timeout: float | None = None) -> str:
-        """Return the firmware's version, "1.2"; CommandRejected from firmware that does not tell it."""
-        version = await self._runner.ask(c.GET_SYSTEM_VERSION, None, timeout=timeout)
-        return f"{version:g}"
-
-    async def get_info(self, *, timeout: float | None = None) -> DeviceInfo:
-        """Return who the arm is: it tells the version of its firmware alone, and older firmware not even that."""
-        try:
-            version = await self.get_version(timeout=timeout)
-        except CommandRejected:
-            version = ""
-
-        return DeviceInfo(serial_number="", name="", version=version)
-
-    async def get_alarms(self, *, timeout: float | None = None) -> tuple[Fault, ...]:
-        """Return what is known to keep the arm from moving: no power, or no place since it had none.
-
-        The protocol has no alarms. This is what the program itself has done to the arm; what others did shows when a
-        motion misses its goal.
-        """
-        await self.get_queue_size(timeout=timeout)
-        return self._runner.state.faults()
-
-    async def clear_alarms(self, *, timeout: float | None = None) -> None:
-        """Return if the arm is there: what `get_alarms` tells ends with `power_on` and `home` alone."""
-        await self.get_queue_size(timeout=timeout)
 
     async def recover(self) -> None:
         """Empty the queue, and let the motors hold if they were told to let go; `home` is then still to be called."""

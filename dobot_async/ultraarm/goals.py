@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from dobot_async.errors import ProtocolError
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.answers import Status
 from dobot_async.wire import Command
@@ -59,6 +60,12 @@ class Goal(Protocol):
     def reached(self, status: Status, tolerance: float, *, set_out: bool) -> bool:
         """Return whether an arm at rest has reached it; `set_out` says that something was seen to move."""
 
+    def come_to(self, before: Status | None, here: Status, tolerance: float) -> bool:
+        """Return whether an arm at rest has come to it, and not only stands near it, where it stood before.
+
+        If in doubt it has not: to be told once more where it stands moves an arm by no more than the tolerance.
+        """
+
     def missed(self, status: Status, *, set_out: bool) -> Fault:
         """Return what to say of an arm that rests elsewhere."""
 
@@ -87,6 +94,11 @@ class PointGoal:
         """Return whether it stands there."""
         distance = self.distance(status)
         return distance is not None and distance <= tolerance
+
+    def come_to(self, before: Status | None, here: Status, tolerance: float) -> bool:
+        """Return whether it stands there, or nearer than before."""
+        was, miss = self.distance(before) if before else None, self.distance(here)
+        return miss is not None and (miss <= GRAIN or (was is not None and miss < was and miss <= tolerance))
 
     def missed(self, status: Status, *, set_out: bool) -> Fault:  # noqa: ARG002 - a place tells enough
         """Return where it came to rest instead."""
@@ -126,6 +138,10 @@ class HomeGoal:
     def reached(self, status: Status, tolerance: float, *, set_out: bool) -> bool:  # noqa: ARG002 - nor a tolerance
         """Return whether something has moved, and the switches are those of home."""
         return set_out and (self.switches is None or status.endstops == self.switches)
+
+    def come_to(self, before: Status | None, here: Status, tolerance: float) -> bool:  # noqa: ARG002 - none of them tells
+        """Return False: nobody knows without having seen it move."""
+        return False
 
     def missed(self, status: Status, *, set_out: bool) -> Fault:
         """Return whether it did not set out, or did not get there."""
@@ -171,6 +187,13 @@ def moved(before: Status, after: Status) -> bool:
 
 
 def pose_of(status: Status) -> c.UltraArmPose:
-    """Return the pose in a status; the fourth joint is 0 where the arm does not tell it."""
+    """Return the pose in a status; the fourth joint is 0 where the arm does not tell it.
+
+    Raises:
+        ProtocolError: It tells less than three numbers of either.
+    """
+    if min(len(status.coords), len(status.angles)) < 3:
+        raise ProtocolError(f"the arm does not tell where it is: COORDS{status.coords}, ANGLES{status.angles}")
+
     (x, y, z, e), joints = ((*numbers[:4], 0.0)[:4] for numbers in (status.coords, status.angles))
     return c.UltraArmPose(x, y, z, e, joints)

@@ -25,7 +25,7 @@ from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.answers import Receipt, Status
 from dobot_async.ultraarm.channel import Channel
 from dobot_async.ultraarm.frame import Frame
-from dobot_async.ultraarm.goals import GRAIN, INCREMENTS, Fault, Goal, PointGoal, goal_of, summed
+from dobot_async.ultraarm.goals import INCREMENTS, Fault, Goal, goal_of, summed
 from dobot_async.ultraarm.state import ArmState
 from dobot_async.ultraarm.status import RESTS, STATUS_AND_ANGLES, StatusPoller
 from dobot_async.ultraarm.stopper import Stopper
@@ -279,7 +279,7 @@ class UltraArmRunner:
                 return True
 
             if self.status.rests >= RESTS:
-                return came_to(goal, before, status, self._tolerance)
+                return goal.come_to(before, status, self._tolerance)
 
     async def _set(self, command: Command[Any, Any], value: Any) -> None:
         """Do what moves nothing, and return when it is done."""
@@ -336,15 +336,3 @@ class UltraArmRunner:
             self._says_ok = bool(receipt.text)
 
         return True
-
-
-def came_to(goal: Goal, before: Status | None, here: Status, tolerance: float) -> bool:
-    """Return whether an arm at rest has come to a goal, and not only stands near it, where it stood before.
-
-    If in doubt it has not: to be told once more where it stands moves an arm by no more than the tolerance.
-    """
-    if not isinstance(goal, PointGoal):
-        return False
-
-    was, miss = goal.distance(before) if before else None, goal.distance(here)
-    return miss is not None and (miss <= GRAIN or (was is not None and miss < was and miss <= tolerance))
