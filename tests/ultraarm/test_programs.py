@@ -158,9 +158,12 @@ def test_any_program(steps: list[tuple[str, int, float]], acknowledge: Any, dept
     run_virtual(run())
 
 
-@pytest.mark.parametrize("first", range(0, 80, 20))
+@pytest.mark.parametrize("first", [160, 180, 240, 260, 340])
 def test_late_replies_on_a_line_that_loses_some_make_no_motion_done(first: int) -> None:
-    """A reply that comes alone may acknowledge another command, or tell of another time: the goals tell."""
+    """A reply that comes alone may acknowledge another command, or tell of another time: the goals tell.
+
+    Some of these seeds fail if one look at rest is enough, in general or on a line that has lost something.
+    """
 
     async def run(seed: int) -> None:
         random = Random(seed)
