@@ -43,7 +43,7 @@ from dobot_async.mycobot.pose import CobotPose
 from dobot_async.mycobot.readings import CobotInfo
 from dobot_async.transports import open_transport
 from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
-from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits
+from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits, UltraArmPose
 from dobot_async.wire import Command
 
 __all__ = [
@@ -100,6 +100,7 @@ __all__ = [
     "UltraArmCoords",
     "UltraArmJog",
     "UltraArmLimits",
+    "UltraArmPose",
     "Unexpected",
     "Unreachable",
     "UnsupportedError",

@@ -65,6 +65,7 @@ NAMES = [
     "UltraArmCoords",
     "UltraArmJog",
     "UltraArmLimits",
+    "UltraArmPose",
     "Unexpected",
     "Unreachable",
     "UnsupportedError",

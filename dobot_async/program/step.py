@@ -31,7 +31,7 @@ class Step:
     verb: str = ""
 
     def __str__(self) -> str:
-        return f"line {self.number} ({shortened(self.text)})"
+        return f"line {self.number} ({shortened(self.text)})" if self.number else f"the program's own {self.text}"
 
 
 class ProgramError(ValueError):

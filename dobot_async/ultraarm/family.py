@@ -9,7 +9,7 @@ __all__ = ["FAMILY"]
 FAMILY = Family(
     public={
         "dobot_async.ultraarm.arm": ("UltraArm", "UltraArmJog"),
-        "dobot_async.ultraarm.params": ("UltraArmAngles", "UltraArmCoords", "UltraArmLimits"),
+        "dobot_async.ultraarm.params": ("UltraArmAngles", "UltraArmCoords", "UltraArmLimits", "UltraArmPose"),
     },
     simulator="dobot_async.simulator.ultraarm:SimulatedUltraArm",
     bridge="dobot_async.ultraarm.bridged:BRIDGED",

@@ -130,7 +130,7 @@ def test_a_gcode_file(tmp_path: Path) -> None:
 
 
 async def test_suction_and_stop_leave_the_rest_alone() -> None:
-    async with simulate("ultraarm", listen="tcp://127.0.0.1:0", speed=50) as sim:
+    async with simulate("ultraarm", homed=True, listen="tcp://127.0.0.1:0", speed=50) as sim:
 
         async def run(*arguments: str) -> str:
             command = (sys.executable, "-W", "error", "-m", "dobot_async", "--arm", "ultraarm", "--url", sim.url)
@@ -144,4 +144,4 @@ async def test_suction_and_stop_leave_the_rest_alone() -> None:
         assert await run("stop") == "stopped\n"
         assert sim.arm.registers.pump
         assert sim.arm.registers.powered
-        assert {each.command for each in sim.arm.executed} == {c.ABSOLUTE, c.PUMP_ON}
+        assert {each.command for each in sim.arm.executed} == {c.PUMP_ON}

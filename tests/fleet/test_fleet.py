@@ -479,7 +479,7 @@ async def test_families_side_by_side() -> None:
     async with (
         simulate(speed=20) as one,
         simulate("mycobot280", speed=20) as two,
-        simulate("ultraarm", speed=20) as three,
+        simulate("ultraarm", homed=True, speed=20) as three,
     ):
         members: dict[str, Member[Magician | MyCobot | UltraArm]] = {
             "magician": Member(one.url, Magician),

@@ -11,7 +11,7 @@ from dobot_async.program import ProgramError
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.gcode import parse_gcode
 
-MOVE = (c.MOVE_COORDS, c.CoordsMove(200, f=50))
+MOVE = (c.MOVE_LINE, c.CoordsMove(200, f=50))
 
 
 def read(path: Path, text: str) -> list[tuple[object, object]]:
