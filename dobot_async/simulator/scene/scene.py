@@ -143,6 +143,8 @@ class Scene:
             if each.carrier is piece:
                 self._stock.settle(each, each.placement)
 
+        self._stirred = True
+
     # What a simulation does.
 
     def share_clock(self, clock: Callable[[], float], speed: float) -> Callable[[], float]:
