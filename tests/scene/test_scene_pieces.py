@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any
+from typing import Any, assert_type
 
 import pytest
 from virtual import virtual
@@ -276,6 +276,13 @@ async def test_a_mycobot_grips_a_piece_in_front_of_its_flange() -> None:
 def test_what_cannot_be_is_refused(make: Any, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         make()
+
+
+async def test_an_application_has_the_scene_with_its_type() -> None:
+    async with simulate(scene=Scene(pieces=[RED])) as sim:
+        assert_type(sim.scene, Scene)
+        assert_type(sim.scene.pieces["red"].position, tuple[float, float, float])
+        assert isinstance(sim.scene, Scene)
 
 
 async def test_without_a_scene_there_is_none() -> None:
