@@ -81,6 +81,9 @@ class Solid:
             end: Where it ends.
             give: mm by which the upper face may be pressed in.
         """
+        if self._is_passed(start, end):
+            return False
+
         a, b = self._inside_lengths(start, give), self._inside_lengths(end, give)
         if min(a) > 0:
             return min(b) > min(a) + NOISE
@@ -89,9 +92,22 @@ class Solid:
 
     def is_crossed(self, start: Place3, end: Place3) -> float | None:
         """Returns the share of a straight way at which it meets the box, or None."""
+        if self._is_passed(start, end):
+            return None
+
         a, b = self._inside_lengths(start, 0.0), self._inside_lengths(end, 0.0)
         first, last = span(a, b)
         return first if first < last else None
+
+    def _is_passed(self, start: Place3, end: Place3) -> bool:
+        """Whether a way is clearly on one side of it; most are, and this is quick."""
+        length, width, height = self.size
+        reach = (length + width) / 2
+        middle = self.base.x, self.base.y, self.base.z + height / 2
+        return any(
+            (a < at - far and b < at - far) or (a > at + far and b > at + far)
+            for a, b, at, far in zip(start, end, middle, (reach, reach, height / 2), strict=True)
+        )
 
     def _inside_lengths(self, place: Place3, give: float) -> tuple[float, ...]:
         """How far a place is behind each of the six faces; in the box all are above 0."""

@@ -101,6 +101,7 @@ class Workpiece:
         self.carrier = carrier
         self.offset = Placement()
         self._refresh = refresh
+        self._still: Solid | None = None  # while it stands on what never moves, for most pieces do
 
     def __repr__(self) -> str:
         return f"<{self.name} at {tuple(round(each, 2) for each in self.position)} on {self.on or 'nothing'}>"
@@ -136,12 +137,12 @@ class Workpiece:
     @property
     def placement(self) -> Placement:
         """Where it was when the scene was last looked at."""
-        return self.carrier.placement.then(self.offset)
+        return self._still.base if self._still else self.carrier.placement.then(self.offset)
 
     @property
     def solid(self) -> Solid:
         """What it fills."""
-        return Solid(self.placement, self.piece.size)
+        return self._still or Solid(self.placement, self.piece.size)
 
     @property
     def below(self) -> Iterator[Carrier]:
@@ -156,6 +157,7 @@ class Workpiece:
     def hang(self, carrier: Carrier, placement: Placement) -> None:
         """Gives it another carrier, with which it goes from now on."""
         self.carrier, self.offset = carrier, carrier.placement.locate(placement)
+        self._still = Solid(placement, self.piece.size) if isinstance(carrier, Standing) else None
 
 
 class Stock:
