@@ -122,6 +122,49 @@ async def test_what_is_held_at_the_end_stays_where_it_is() -> None:
     assert scene.pieces["red"].position[2] == height
 
 
+async def test_no_time_passes_while_a_piece_is_read() -> None:
+    """The arm lets go at the very moment at which the piece's place is read: it is in the hand, or on the table."""
+    clock = Leaping()
+    scene = Scene(pieces=[Piece("red", (250, 0))])
+    async with simulate(scene=scene, clock=clock) as sim, Magician.connect(sim.url) as arm:
+        await arm.move_to(250, 0, LOW)
+        await arm.suction(True)
+        await arm.move_to(250, 0, 40)
+        clock.running = False
+        async with arm.queue.batch() as batch:
+            batch.wait(1)
+            batch.suction(False)
+
+        red = scene.pieces["red"]
+        clock.leap_after(1)  # the first look is that which brings the scene up to now
+        assert red.position[2] == pytest.approx(40 - 59.5 - 25)
+        assert red.position[2] == -138.0
+        clock.running = True
+
+
+class Leaping:
+    """A clock that runs by 10 ms with each look, or stands still and then leaps on by a minute."""
+
+    def __init__(self) -> None:
+        self.running = True
+        self._now = 0.0
+        self._looks: int | None = None
+
+    def leap_after(self, looks: int) -> None:
+        """Leaps on after so many further looks."""
+        self._looks = looks
+
+    def __call__(self) -> float:
+        if self._looks is not None:
+            self._looks -= 1
+            if self._looks < 0:
+                self._now, self._looks = self._now + 60, None
+        elif self.running:
+            self._now += 0.01
+
+        return self._now
+
+
 async def test_arms_of_one_scene_have_one_time() -> None:
     scene = Scene()
     async with simulate(scene=scene, speed=20):

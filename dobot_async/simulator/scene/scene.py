@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -114,9 +115,9 @@ class Scene:
 
     def add(self, piece: Piece) -> Workpiece:
         """Puts a piece into the scene, such as the next one onto a belt; raises ValueError if its name is taken."""
-        self.refresh()
-        self._stirred = True
-        return self._stock.add(piece, self.refresh)
+        with self.still():
+            self._stirred = True
+            return self._stock.add(piece, self.still)
 
     def put(self, name: str, x: float, y: float, z: float | None = None) -> None:
         """Takes a piece and puts it elsewhere; it falls from z (mm) onto what is below it, by default from above all.
@@ -124,11 +125,11 @@ class Scene:
         Raises:
             KeyError: There is no such piece.
         """
-        self.refresh()
-        piece = self._stock.pieces[name]
-        self._take_out_of_hand(piece)
-        self._stock.settle(piece, Placement(x, y, ABOVE_ALL if z is None else z, piece.placement.yaw))
-        self._stirred = True
+        with self.still():
+            piece = self._stock.pieces[name]
+            self._take_out_of_hand(piece)
+            self._stock.settle(piece, Placement(x, y, ABOVE_ALL if z is None else z, piece.placement.yaw))
+            self._stirred = True
 
     def remove(self, name: str) -> None:
         """Takes a piece away; what stood on it falls.
@@ -136,14 +137,14 @@ class Scene:
         Raises:
             KeyError: There is no such piece.
         """
-        self.refresh()
-        piece = self._stock.pieces.pop(name)
-        self._take_out_of_hand(piece)
-        for each in self._stock.pieces.values():
-            if each.carrier is piece:
-                self._stock.settle(each, each.placement)
+        with self.still():
+            piece = self._stock.pieces.pop(name)
+            self._take_out_of_hand(piece)
+            for each in self._stock.pieces.values():
+                if each.carrier is piece:
+                    self._stock.settle(each, each.placement)
 
-        self._stirred = True
+            self._stirred = True
 
     # What a simulation does.
 
@@ -205,6 +206,16 @@ class Scene:
     def refresh(self) -> None:
         """Brings everything up to the clock."""
         self.advance(self._clock())
+
+    @contextmanager
+    def still(self) -> Iterator[None]:
+        """Brings everything up to the clock, and lets no time pass within a block: all that is read there fits."""
+        self.refresh()
+        busy, self._busy = self._busy, True
+        try:
+            yield
+        finally:
+            self._busy = busy
 
     def _go(self, until: float) -> None:
         while True:
@@ -280,10 +291,10 @@ class Scene:
 
     def _detach(self, seat: Seat) -> None:
         """Takes an arm out; what it holds stays where it is."""
-        self.refresh()
-        seat.leave()
-        for belt in self._belts_of(seat.mount):
-            belt.plug(None)
+        with self.still():
+            seat.leave()
+            for belt in self._belts_of(seat.mount):
+                belt.plug(None)
 
         seat.arm.device.scene = None
         self._seats.remove(seat)

@@ -7,6 +7,7 @@ sees it. So it goes with its carrier, whatever that does, and nothing has to be 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -96,11 +97,11 @@ class Workpiece:
         offset: Where it is, seen from its carrier.
     """
 
-    def __init__(self, piece: Piece, carrier: Carrier, refresh: Callable[[], None]) -> None:
+    def __init__(self, piece: Piece, carrier: Carrier, still: Callable[[], AbstractContextManager[None]]) -> None:
         self.piece = piece
         self.carrier = carrier
         self.offset = Placement()
-        self._refresh = refresh
+        self._time_stands_still = still
         self._still: Solid | None = None  # while it stands on what never moves, for most pieces do
 
     def __repr__(self) -> str:
@@ -119,20 +120,20 @@ class Workpiece:
     @property
     def position(self) -> Place3:
         """Where the middle of its lower face is now: x, y, z in mm."""
-        self._refresh()
-        return self.placement.place
+        with self._time_stands_still():
+            return self.placement.place
 
     @property
     def yaw(self) -> float:
         """How far it is turned about the vertical now, degrees from -180 up to 180."""
-        self._refresh()
-        return (self.placement.yaw + 180) % 360 - 180
+        with self._time_stands_still():
+            return (self.placement.yaw + 180) % 360 - 180
 
     @property
     def on(self) -> str:
         """The name of what it stands on; of an arm that holds it, "tool of" and the arm's name."""
-        self._refresh()
-        return self.carrier.name
+        with self._time_stands_still():
+            return self.carrier.name
 
     @property
     def placement(self) -> Placement:
@@ -183,12 +184,12 @@ class Stock:
         """All but the pieces."""
         return [self.table, *self._blocks, *self.belts]
 
-    def add(self, piece: Piece, refresh: Callable[[], None]) -> Workpiece:
-        """Puts a new piece where it is to be, and lets it fall."""
+    def add(self, piece: Piece, still: Callable[[], AbstractContextManager[None]]) -> Workpiece:
+        """Puts a new piece where it is to be, and lets it fall; `still` is what it is read within."""
         if piece.name in self.pieces or piece.name in {each.name for each in self.fixed}:
             raise ValueError(f"there is something called {piece.name!r} in the scene already")
 
-        found = Workpiece(piece, self.table, refresh)
+        found = Workpiece(piece, self.table, still)
         self.settle(found, Placement(*piece.at[:2], piece.at[2] if len(piece.at) > 2 else ABOVE_ALL, piece.yaw))
         self.pieces[piece.name] = found
         return found
