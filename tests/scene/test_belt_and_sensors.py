@@ -142,6 +142,22 @@ async def test_a_hand_puts_pieces_into_the_beam_and_takes_them_away() -> None:
         assert await arm.get_infrared(InfraredPort.GP2)
 
 
+async def test_a_belt_that_stops_between_two_looks_has_brought_the_piece_into_the_beam() -> None:
+    """It runs for 5 ms, at 100 mm/s, and the piece is 0.3 mm from the beam."""
+    now = 0.0
+    scene = Scene(pieces=[Piece("red", (239.7, 150), (20, 20, 20))], belts=[BELT], sensors=[EYE])
+    async with simulate(scene=scene, clock=lambda: now) as sim:
+        now = 1.0
+        assert scene.time == 1.0
+        sim.arm.perform(c.SET_E_MOTOR, c.EMotor(0, is_enabled=True, speed=10_000))
+        now = 1.005
+        sim.arm.perform(c.SET_E_MOTOR, c.EMotor(0, is_enabled=False, speed=0))
+        assert not sim.arm.infrared[InfraredPort.GP2]
+        now = 2.0
+        assert scene.pieces["red"].position[0] == pytest.approx(240.2)
+        assert sim.arm.infrared[InfraredPort.GP2]
+
+
 @virtual
 async def test_the_belt_and_the_sensors_are_those_of_the_arm_that_they_are_plugged_into() -> None:
     eye = LightBeam(EYE.at, EYE.to, port=InfraredPort.GP2, arm="right")

@@ -223,7 +223,7 @@ class Scene:
                 self._look()
 
             event = min((seat.arm.device.due for seat in self._seats), default=math.inf)
-            step = (math.floor(self._time / STEP + 1e-6) + 1) * STEP if self._stirs() else math.inf
+            step = next_step(self._time) if self._stirs() else math.inf
             self._stirred = self._stirred or step < math.inf
             time = min(until, max(self._time, min(event, step)))
             for seat in self._seats:
@@ -300,3 +300,9 @@ class Scene:
         self._seats.remove(seat)
         if not self._seats:
             self._clock = lambda: self._time
+
+
+def next_step(time: float) -> float:
+    """The first multiple of STEP after a time, whichever way its division is rounded."""
+    number = math.floor(time / STEP)
+    return next(number * STEP for number in (number, number + 1, number + 2) if number * STEP > time)
