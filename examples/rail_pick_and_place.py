@@ -2,7 +2,7 @@
 
     python rail_pick_and_place.py [serial:///dev/ttyUSB0 | udp://192.168.1.20 | ...]
 
-On a real arm: home it, with the rail, and set the places to yours. `l` is where the arm stands on the rail, in mm.
+On a real arm: set the places to yours, and clear its way home. `l` is where the arm stands on the rail, in mm.
 """
 
 import asyncio
@@ -32,6 +32,7 @@ async def main() -> None:
     async with Magician.connect(URL) as arm:
         await arm.set_end_effector(SuctionCup())
         await arm.set_rail()
+        await arm.home()  # which finds the end of the rail as well, now that the arm knows of it
         for number, (x, y) in enumerate(PLACES, 1):
             await reach(arm, x, y, TRAY, suck=True)
             await reach(arm, x, y, RACK, suck=False)

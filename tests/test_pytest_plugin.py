@@ -62,10 +62,12 @@ def dobot_scene():
 
 async def carry(url):
     async with Magician.connect(url) as arm:
+        await arm.home()
         for (x, y), on in (((250, 0), True), ((200, 100), False)):
             await arm.move_to(x, y, 20)
             await arm.move_to(x, y, -53.5)
             await arm.suction(on)
+            await arm.wait(0.3)
             await arm.move_to(x, y, 20)
 
 async def test_a_piece_is_carried(simulated_arm, dobot_scene):
@@ -85,9 +87,11 @@ async def test_two_arms(simulated_arm, simulate_arm, dobot_scene):
     right = await simulate_arm("ultraarm", mount=Mount(x=500, yaw=180, name="right"))
     async with Magician.connect(simulated_arm.url) as one, UltraArm.connect(right.url) as other:
         await other.home()
+        await one.home()
         await one.move_to(200, 0, 0)
         await one.move_to(200, 0, -53.5)
         await one.suction(True)
+        await one.wait(0.3)
         assert dobot_scene.pieces["red"].on == "tool of left"
     assert right.scene is dobot_scene
 """

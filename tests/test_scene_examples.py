@@ -11,19 +11,24 @@ from pathlib import Path
 
 import pytest
 
-from dobot_async import ColorPort, InfraredPort
+from dobot_async import ColorPort, InfraredPort, Magician
+from dobot_async.magician.commands import AccessoryVersion
 from dobot_async.simulator import simulate
 from dobot_async.simulator.scene import Belt, Block, ColorSpot, LightBeam, Mount, PenTool, Piece, Place3, Scene
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SHORT = 50  # an example has fewer lines
 FAST = 20
+V2 = AccessoryVersion.V2
 SMALL = (20.0, 20.0, 20.0)
 
 
 async def run(scene: Scene, name: str, *arguments: str, mount: Mount | None = None) -> list[str]:
     """Runs an example in a scene, and returns the lines that it printed."""
     async with simulate(scene=scene, mount=mount, listen="tcp://127.0.0.1:0", speed=FAST) as sim:
+        async with Magician.connect(sim.url) as arm:
+            await arm.home()
+
         command = [sys.executable, "-W", "error", str(EXAMPLES / name), sim.url, *arguments]
         done = await asyncio.to_thread(
             subprocess.run, command, capture_output=True, text=True, check=False, timeout=100
@@ -48,8 +53,8 @@ async def test_the_sorter_puts_each_piece_into_the_box_of_its_colour() -> None:
         blocks=[Block(f"{color} box", place, (50, 50, 2)) for color, place in boxes.items()],
         belts=[Belt("belt", (100, 120), (320, 50, 58.5))],
         sensors=[
-            LightBeam((230, 145, -70), (230, 95, -70), port=InfraredPort.GP4),
-            ColorSpot((200, -60, -138), (200, -60, -110), port=ColorPort.GP2),
+            LightBeam((230, 145, -70), (230, 95, -70), port=InfraredPort.GP4, version=V2),
+            ColorSpot((200, -60, -138), (200, -60, -110), port=ColorPort.GP2, version=V2),
         ],
     )
     lines = await run(scene, "color_sorter.py")

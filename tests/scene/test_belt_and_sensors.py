@@ -34,6 +34,7 @@ async def until(arm: Magician, *, seen: bool) -> None:
 async def test_a_belt_carries_what_stands_on_it() -> None:
     scene = Scene(pieces=[RED, Piece("beside", (100, 0))], belts=[BELT])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.conveyor(5000, distance=6000)
         assert scene.pieces["red"].position == pytest.approx((160, 150, -98), abs=0.02)
         await arm.conveyor(-5000, distance=2000)
@@ -45,8 +46,9 @@ async def test_a_belt_carries_what_stands_on_it() -> None:
 
 @virtual
 async def test_what_a_belt_carries_beyond_its_end_falls() -> None:
-    scene = Scene(pieces=[RED], belts=[BELT], blocks=[Block("crate", (380, 150), (59, 60, 5))])
+    scene = Scene(pieces=[RED], belts=[BELT], blocks=[Block("crate", (380, 150), (60, 60, 5))])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.conveyor(5000)
         await asyncio.sleep(10)
         await arm.conveyor(0)
@@ -61,6 +63,7 @@ async def test_what_a_belt_carries_beyond_its_end_falls() -> None:
 async def test_a_light_beam_sees_a_piece_pass() -> None:
     scene = Scene(pieces=[RED], belts=[BELT], sensors=[EYE])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         assert not await arm.get_infrared(InfraredPort.GP2)
         await arm.set_infrared_sensor(InfraredPort.GP2)
         assert not await arm.get_infrared(InfraredPort.GP2)
@@ -81,6 +84,7 @@ async def test_the_arm_itself_waits_for_a_beam_at_a_pin(pause: float) -> None:
     beam = LightBeam(EYE.at, EYE.to, pin=4)
     scene = Scene(pieces=[RED], belts=[BELT], sensors=[beam])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.configure_io(4, IOFunction.DI)
         async with arm.queue.batch() as batch:
             batch.conveyor(5000)
@@ -101,13 +105,34 @@ async def test_a_colour_sensor_sees_the_nearest_piece(color: str, flags: tuple[i
     spot = ColorSpot((250, 0, -125), (350, 0, -125), port=ColorPort.GP4)
     scene = Scene(pieces=[Piece("far", (330, 0), color="green"), Piece("near", (290, 0), color=color)], sensors=[spot])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
-        assert await arm.get_color() == c.Color(0, 0, 0)
-        await arm.set_color_sensor(ColorPort.GP2)
-        await arm.move_by(z=5)
-        assert await arm.get_color() == c.Color(0, 0, 0)
-        await arm.set_color_sensor(ColorPort.GP4)
-        await arm.move_by(z=5)
-        assert await arm.get_color() == c.Color(*flags)
+        await arm.home()
+        seen = []
+        for port in (None, ColorPort.GP2, ColorPort.GP4):
+            if port is not None:
+                await arm.set_color_sensor(port)
+
+            await asyncio.sleep(0.5)
+            seen.append(await arm.get_color())
+
+        assert seen == [c.Color(0, 0, 0), c.Color(0, 0, 0), c.Color(*flags)]
+
+
+@pytest.mark.parametrize("plugged", c.AccessoryVersion)
+@pytest.mark.parametrize("switched", c.AccessoryVersion)
+@virtual
+async def test_a_sensor_of_the_other_version_sees_nothing(
+    plugged: c.AccessoryVersion, switched: c.AccessoryVersion
+) -> None:
+    beam = LightBeam((250, 0, -125), (350, 0, -125), port=InfraredPort.GP4, version=plugged)
+    spot = ColorSpot(beam.at, beam.to, version=plugged)
+    scene = Scene(pieces=[Piece("red", (290, 0), color="red")], sensors=[beam, spot])
+    async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.request(c.SET_INFRARED_SENSOR, c.InfraredSensor(enable=True, port=InfraredPort.GP4, version=switched))
+        await arm.request(c.SET_COLOR_SENSOR, c.ColorSensor(enable=True, port=ColorPort.GP2, version=switched))
+        await asyncio.sleep(0.5)
+        fits = plugged is switched
+        assert await arm.get_infrared(InfraredPort.GP4) == fits
+        assert (await arm.get_color()).r == fits
 
 
 @virtual
@@ -115,10 +140,12 @@ async def test_a_piece_that_the_arm_holds_is_seen() -> None:
     spot = ColorSpot((200, 100, -138), (200, 100, -100), port=ColorPort.GP2)
     scene = Scene(pieces=[Piece("red", (250, 0), color="red")], sensors=[spot])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.set_color_sensor(ColorPort.GP2)
         await arm.move_to(250, 0, 20)
         await arm.move_to(250, 0, -53.5)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.move_to(250, 0, 20)
         assert not (await arm.get_color()).r
         await arm.move_to(200, 100, 20)
@@ -130,15 +157,16 @@ async def test_a_piece_that_the_arm_holds_is_seen() -> None:
 async def test_a_hand_puts_pieces_into_the_beam_and_takes_them_away() -> None:
     scene = Scene(pieces=[RED], belts=[BELT], sensors=[EYE])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.set_infrared_sensor(InfraredPort.GP2)
         scene.put("red", 250, 150)
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.5)
         assert await arm.get_infrared(InfraredPort.GP2)
         scene.remove("red")
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.5)
         assert not await arm.get_infrared(InfraredPort.GP2)
         scene.add(Piece("blue", (250, 150)))
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.5)
         assert await arm.get_infrared(InfraredPort.GP2)
 
 
@@ -189,7 +217,7 @@ async def test_a_mycobot_has_a_beam_at_a_pin_of_its_atom() -> None:
         assert not (await arm.request(cobot.GET_DIGITAL_INPUT, 19)).level
         scene.add(RED)
         scene.put("red", 300, 0)
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.5)
         assert (await arm.request(cobot.GET_DIGITAL_INPUT, 19)).level
 
 

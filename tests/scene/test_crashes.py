@@ -19,6 +19,7 @@ WALL = Block("wall", (230, 60), (60, 1, 200))
 async def test_a_magician_runs_into_the_table() -> None:
     scene = Scene()
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(220, 0, 0)
         with pytest.raises(ArmAlarm) as caught:
             await arm.move_to(220, 0, -90, mode=PTPMode.MOVL_XYZ)
@@ -40,6 +41,7 @@ async def test_a_magician_runs_into_the_table() -> None:
 async def test_no_wall_is_too_thin_for_a_fast_arm() -> None:
     scene = Scene(blocks=[WALL])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.set_speed(100)
         await arm.move_to(230, 0, 50)
         with pytest.raises(ArmAlarm):
@@ -54,6 +56,7 @@ async def test_no_wall_is_too_thin_for_a_fast_arm() -> None:
 async def test_above_the_wall_is_free() -> None:
     scene = Scene(blocks=[Block("wall", (230, 60), (60, 1, 80))])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(230, 0, 50)
         await arm.move_to(230, 120, 50, mode=PTPMode.MOVL_XYZ)
 
@@ -65,9 +68,11 @@ async def test_what_the_arm_holds_runs_into_things_too() -> None:
     """The wall ends below the tip, but not below the piece that hangs at it."""
     scene = Scene(pieces=[Piece("red", (230, 0))], blocks=[Block("wall", (230, 60), (60, 1, 80))])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(230, 0, 20)
         await arm.move_to(230, 0, -53.5)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.move_to(230, 0, 20)
         with pytest.raises(ArmAlarm):
             await arm.move_to(230, 120, 20, mode=PTPMode.MOVL_XYZ)
@@ -80,6 +85,7 @@ async def test_what_the_arm_holds_runs_into_things_too() -> None:
 async def test_a_piece_on_the_way_is_run_into() -> None:
     scene = Scene(pieces=[Piece("tower", (230, 60), (20, 20, 150))])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(230, 0, 20)
         with pytest.raises(ArmAlarm):
             await arm.move_to(230, 120, 20, mode=PTPMode.MOVL_XYZ)
@@ -91,6 +97,7 @@ async def test_a_piece_on_the_way_is_run_into() -> None:
 async def test_what_is_behind_a_crash_is_not_executed() -> None:
     scene = Scene(blocks=[WALL])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(230, 0, 50)
         async with arm.queue.batch() as batch:
             crash = batch.move_to(230, 120, 50, mode=PTPMode.MOVL_XYZ)
@@ -107,6 +114,7 @@ async def test_what_is_behind_a_crash_is_not_executed() -> None:
 async def test_a_jog_runs_into_the_table() -> None:
     scene = Scene()
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(220, 0, -60)
         with suppress(ArmAlarm):
             await arm.jog(Jog.Z_MINUS, 2)
@@ -120,6 +128,7 @@ async def test_a_jog_runs_into_the_table() -> None:
 async def test_a_stopped_arm_may_not_be_driven_on_into_what_it_has_met() -> None:
     scene = Scene()
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(220, 0, -70)
         for _ in range(2):
             with pytest.raises(ArmAlarm):
@@ -136,6 +145,7 @@ async def test_a_stopped_arm_may_not_be_driven_on_into_what_it_has_met() -> None
 async def test_a_hand_that_guides_the_arm_through_a_wall_is_no_crash() -> None:
     scene = Scene(blocks=[WALL])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(230, 0, 50)
         sim.arm.guide_to(230, 120, 50)
         await arm.move_to(230, 130, 50)
@@ -176,6 +186,7 @@ async def test_an_ultraarm_stays_where_it_has_hit_something() -> None:
 async def test_a_pen_draws_where_it_touches() -> None:
     scene = Scene()
     async with simulate(scene=scene, mount=Mount(tool=PenTool())) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.set_end_effector(Pen())
         down = -138 + 59.5
         for x, y in ((220, 0), (220, 60)):

@@ -20,6 +20,8 @@ ON_TABLE = -138.0 + 25 + 59.5  # where the arm has to be for the cup to touch th
 @asynccontextmanager
 async def cell(scene: Scene, mount: Mount | None = None, **details: Any) -> AsyncIterator[tuple[Simulation, Magician]]:
     async with simulate(scene=scene, mount=mount, **details) as sim, Magician.connect(sim.url) as arm:
+        await arm.set_rail()
+        await arm.home()
         yield sim, arm
 
 
@@ -38,12 +40,14 @@ async def test_a_piece_is_carried_and_falls_on_a_pallet() -> None:
     async with cell(scene) as (sim, arm):
         await go_down(arm, 250, 0, ON_TABLE)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.move_to(250, 0, 20)
         assert scene.pieces["red"].on == "tool of"
         assert place(scene.pieces["red"]) == (250, 0, 20 - 59.5 - 25)
 
         await go_down(arm, 180, 120, 0)
         await arm.suction(False)
+        await arm.wait(0.3)
         assert place(sim.scene.pieces["red"]) == (180, 120, -118)
         assert scene.pieces["red"].on == "pallet"
 
@@ -57,9 +61,11 @@ async def test_a_piece_turns_with_the_tool() -> None:
     async with cell(scene) as (_, arm):
         await go_down(arm, 250, 10, ON_TABLE, r=10)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.move_to(250, 0, 20, 10)
         await arm.move_to(250, 0, 20, 100)
         await arm.suction(False)
+        await arm.wait(0.3)
 
     assert scene.pieces["red"].yaw == pytest.approx(90, abs=0.01)
     # It hung 10 mm beside the tip, which is now to the other side.
@@ -80,6 +86,7 @@ async def test_a_piece_stays_where_the_cup_does_not_take_it(x: float, z: float, 
     async with cell(scene) as (_, arm):
         await go_down(arm, x, 0, z)
         await arm.suction(suck)
+        await arm.wait(0.3)
         await arm.move_to(250, 60, 40)
         assert scene.pieces["red"].on == "table"
 
@@ -91,6 +98,7 @@ async def test_a_cup_that_sucks_takes_what_it_comes_to() -> None:
     scene = Scene(pieces=[RED])
     async with cell(scene) as (_, arm):
         await arm.suction(True)
+        await arm.wait(0.3)
         await go_down(arm, 250, 0, ON_TABLE)
         await arm.move_to(250, 0, 20)
         assert scene.pieces["red"].on == "tool of"
@@ -103,9 +111,11 @@ async def test_a_piece_is_let_go_in_the_middle_of_a_queue() -> None:
         async with arm.queue.batch() as batch:
             batch.move_to(250, 0, ON_TABLE)
             batch.suction(True)
+            batch.wait(0.3)
             batch.move_to(250, 0, 20)
             batch.move_to(200, 100, 20)
             batch.suction(False)
+            batch.wait(0.3)
             last = batch.move_to(250, 0, 20)
 
         await last
@@ -120,9 +130,11 @@ async def test_pieces_stand_on_each_other_and_go_together() -> None:
     async with cell(scene) as (_, arm):
         await go_down(arm, 240, 0, -118 + 59.5)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.move_to(240, 0, 20)
         await arm.move_to(200, 60, 20)
         await arm.suction(False)
+        await arm.wait(0.3)
 
     assert scene.pieces["high"].on == "low"
     assert place(scene.pieces["low"]) == (210, 60, -138)
@@ -135,9 +147,11 @@ async def test_a_gripper_takes_what_is_between_its_fingers_when_they_close() -> 
     async with cell(scene, Mount(tool=GripperTool())) as (_, arm):
         await go_down(arm, 250, 1, ON_TABLE - 12)
         await arm.gripper(True)
+        await arm.wait(0.6)
         await arm.move_to(250, 1, 40)
         await arm.move_to(200, 60, 40)
         await arm.gripper(False)
+        await arm.wait(0.6)
 
     assert [each.kind for each in scene.events] == ["picked", "dropped"]
     assert place(scene.pieces["red"]) == (200, 59, -138)
@@ -161,6 +175,7 @@ async def test_a_gripper_takes_what_fits(piece: Piece, y: float, first: str) -> 
         else:
             await go_down(arm, 250, y, ON_TABLE - 12)
             await arm.gripper(True)
+            await arm.wait(0.6)
 
     assert scene.events[0].kind == first
 
@@ -170,6 +185,7 @@ async def test_a_closed_gripper_takes_nothing() -> None:
     scene = Scene(pieces=[RED])
     async with cell(scene, Mount(tool=GripperTool())) as (_, arm):
         await arm.gripper(True)
+        await arm.wait(0.6)
         with pytest.raises(ArmAlarm, match="0x51"):
             await go_down(arm, 250, 0, ON_TABLE - 12)
 
@@ -182,12 +198,13 @@ async def test_the_arm_is_where_its_mount_says() -> None:
     scene = Scene(pieces=[Piece("red", (800, 350))], table=0)
     mount = Mount(1000, 100, 138, 90)
     async with cell(scene, mount) as (_, arm):
-        await arm.set_rail()
         await arm.move_to(250, 0, 20, l=200)
         await arm.move_to(250, 0, ON_TABLE, l=200)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.move_to(250, 0, 20, l=0)
         await arm.suction(False)
+        await arm.wait(0.3)
 
     assert place(scene.pieces["red"]) == (1000, 350, 0)
 
@@ -200,6 +217,7 @@ async def test_the_tip_is_where_the_arm_really_is() -> None:
         sim.arm.lose_steps(1, 10)
         await go_down(arm, 250, 0, ON_TABLE)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.move_to(250, 0, 20)
 
     assert scene.pieces["red"].on == "table"
@@ -212,6 +230,7 @@ async def test_a_wrong_end_effector_misses() -> None:
     async with cell(scene, Mount(tool=CupTool(offset=90))) as (_, arm):
         await go_down(arm, 250, 0, ON_TABLE)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.move_to(250, 0, 20)
 
     assert scene.pieces["red"].on == "table"
@@ -225,9 +244,11 @@ async def test_an_ultraarm_carries_a_piece() -> None:
         await arm.move_to(240, 0, 40)
         await arm.move_to(240, 0, -60 + 25 + 59.5)
         await arm.suction(True)
+        await arm.wait(1)
         await arm.move_to(240, 0, 60)
         await arm.move_to(200, 100, 60)
         await arm.suction(False)
+        await arm.wait(1)
         await arm.move_to(200, 100, 80)
 
     assert place(scene.pieces["red"]) == (200, 100, -60)

@@ -19,6 +19,7 @@ async def carry(arm: Magician, start: tuple[float, float], end: tuple[float, flo
         await arm.move_to(x, y, 20)
         await arm.move_to(x, y, LOW)
         await arm.suction(on)
+        await arm.wait(0.3)
         await arm.move_to(x, y, 20)
 
 
@@ -32,6 +33,8 @@ async def test_a_piece_goes_from_hand_to_hand() -> None:
         Magician.connect(one.url) as left,
         Magician.connect(other.url) as right,
     ):
+        await left.home()
+        await right.home()
         await carry(left, (200, 100), (250, 0))
         await carry(right, (250, 0), (200, -100))
 
@@ -55,9 +58,12 @@ async def test_who_is_read_first_decides_nothing(first: str) -> None:
         Magician.connect(one.url) as left,
         Magician.connect(other.url) as right,
     ):
+        await left.home()
+        await right.home()
         await left.move_to(220, 0, 20)
         await right.move_to(220, 0, 40)
         await left.suction(True)
+        await left.wait(0.3)
         await right.suction(True)
         motions = [await right.queue.move_to(220, 0, LOW), await left.queue.move_to(220, 0, LOW)]
         motions += [await right.queue.move_to(180, 100, 20), await left.queue.move_to(180, 100, 20)]
@@ -81,6 +87,7 @@ async def test_arms_of_two_families_share_a_scene() -> None:
         Magician.connect(one.url) as left,
         UltraArm.connect(other.url) as ultra,
     ):
+        await left.home()
         await ultra.home()
         await ultra.move_to(200, 100, 60)
         await carry(left, (200, 100), (250, 0))
@@ -88,9 +95,11 @@ async def test_arms_of_two_families_share_a_scene() -> None:
         await ultra.move_to(240, 0, 60)
         await ultra.move_to(240, 0, -62 + 25 + 59.5)
         await ultra.suction(True)
+        await ultra.wait(1)
         await ultra.move_to(240, 0, 60)
         await ultra.move_to(200, 100, 60)
         await ultra.suction(False)
+        await ultra.wait(1)
         await ultra.wait(1)
 
     assert scene.pieces["red"].position == pytest.approx((290, -100, -138), abs=0.1)
@@ -102,6 +111,7 @@ async def test_a_scene_outlives_its_arms() -> None:
     scene = Scene(pieces=[Piece("red", (200, 100))])
     for start, end in (((200, 100), (250, 0)), ((250, 0), (200, -100))):
         async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+            await arm.home()
             await asyncio.sleep(3)
             await carry(arm, start, end)
 
@@ -112,9 +122,11 @@ async def test_a_scene_outlives_its_arms() -> None:
 async def test_what_is_held_at_the_end_stays_where_it_is() -> None:
     scene = Scene(pieces=[Piece("red", (250, 0))])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(250, 0, 20)
         await arm.move_to(250, 0, LOW)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.queue.move_to(250, 0, 20)
 
     height = scene.pieces["red"].position[2]
@@ -127,13 +139,16 @@ async def test_no_time_passes_while_a_piece_is_read() -> None:
     clock = Leaping()
     scene = Scene(pieces=[Piece("red", (250, 0))])
     async with simulate(scene=scene, clock=clock) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
         await arm.move_to(250, 0, LOW)
         await arm.suction(True)
+        await arm.wait(0.3)
         await arm.move_to(250, 0, 40)
         clock.running = False
         async with arm.queue.batch() as batch:
             batch.wait(1)
             batch.suction(False)
+            batch.wait(0.3)
 
         red = scene.pieces["red"]
         clock.leap_after(1)  # the first look is that which brings the scene up to now
@@ -184,12 +199,15 @@ async def test_how_often_somebody_looks_changes_nothing() -> None:
     for busy in (False, True):
         scene = Scene(pieces=[Piece("red", (250, 0)), Piece("blue", (250, 60))])
         async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
+            await arm.home()
             async with arm.queue.batch() as batch:
                 batch.move_to(250, 0, 20)
                 batch.move_to(250, 0, LOW)
                 batch.suction(True)
+                batch.wait(0.3)
                 batch.move_to(250, 0, 40)
                 batch.suction(False)
+                batch.wait(0.3)
                 batch.move_to(200, 100, 40)
                 batch.move_to(200, 100, -90)
 
@@ -198,7 +216,12 @@ async def test_how_often_somebody_looks_changes_nothing() -> None:
                 await asyncio.sleep(0.001 if busy else 20)
                 assert sim.arm.executed
 
-            ends.append([(each.kind, each.what, round(each.time - begun, 6), each.place) for each in scene.events])
+            ends.append(
+                [
+                    (each.kind, each.what, round(each.time - begun, 6), tuple(round(n, 6) for n in each.place))
+                    for each in scene.events
+                ]
+            )
 
     assert [kind for kind, *_ in ends[0]] == ["picked", "dropped", "crash"]
     assert ends[0] == ends[1]

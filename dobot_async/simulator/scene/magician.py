@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from dobot_async.magician import commands as c
 from dobot_async.magician.kinematics import Kinematics
 from dobot_async.simulator.device import Device
@@ -45,6 +47,12 @@ class MagicianInScene:
         """It is closed, or open."""
         return 0.0 if self.arm.gripper else 1.0
 
+    @property
+    def switches(self) -> Any:
+        """The registers of its sensors."""
+        get = self.arm.state.get
+        return get(c.SET_COLOR_SENSOR), *(get(c.SET_INFRARED_SENSOR, port) for port in c.InfraredPort)
+
     def tip(self, tool: Tool) -> Placement:
         """With the steps that it has lost: where it is, and not where it believes to be."""
         joints = [at + lost for at, lost in zip(self.arm.device.joints, self.arm.state.lost_steps, strict=False)]
@@ -66,11 +74,13 @@ class MagicianInScene:
     def sees(self, sensor: LightBeam, seen: bool) -> None:
         """At a socket or at a pin."""
         if sensor.port is not None:
-            self.arm.infrared[sensor.port] = seen
+            register = self.arm.state.get(c.SET_INFRARED_SENSOR, sensor.port)
+            self.arm.infrared[sensor.port] = seen and register.version is sensor.version
         elif sensor.pin is not None:
             self.arm.set_input(sensor.pin, int(seen))
 
     def sees_color(self, sensor: ColorSpot, flags: tuple[int, int, int]) -> None:
         """At the socket that is switched on."""
-        if self.arm.state.get(c.SET_COLOR_SENSOR).port is sensor.port:
-            self.arm.color = c.Color(*flags)
+        register = self.arm.state.get(c.SET_COLOR_SENSOR)
+        if register.port is sensor.port:
+            self.arm.color = c.Color(*flags) if register.version is sensor.version else c.Color(0, 0, 0)

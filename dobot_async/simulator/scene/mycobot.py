@@ -19,6 +19,7 @@ class MyCobotInScene:
     """A myCobot; the tip is in front of its flange, wherever that looks."""
 
     rail = 0.0
+    switches = None
     sucks = False
 
     def __init__(self, arm: SimulatedMyCobot) -> None:

@@ -66,6 +66,10 @@ class SceneArm(Protocol):
     def opening(self) -> float:
         """How far its gripper is open, 0 to 1."""
 
+    @property
+    def switches(self) -> Any:
+        """How its sensors are switched; when that changes, it is told again what they see."""
+
     def tip(self, tool: Tool) -> Placement:
         """Returns where the tip of a tool is now, in the arm's own coordinates."""
 
@@ -105,6 +109,7 @@ class Seat:
         self._gone: Placement | None = None
         self._tip = self.placement
         self._grip = self.grip
+        self._switches = self.arm.switches
         self._drawing: list[Place3] | None = None
 
     @property
@@ -139,7 +144,10 @@ class Seat:
 
     @property
     def changed(self) -> bool:
-        """Whether it grips otherwise than when it was looked at last; fingers on their way are looked at anyway."""
+        """Whether it was switched since it was looked at last; fingers on their way are looked at anyway."""
+        if self.arm.switches != self._switches:
+            return True
+
         if isinstance(self.mount.tool, GripperTool) and self.arm.moving:
             return False
 
@@ -163,6 +171,7 @@ class Seat:
 
         self.moved = moves
         self._tip = now
+        self._switches = self.arm.switches
         self._take_and_let_go(now, time)
         if isinstance(self.mount.tool, PenTool):
             down = now.z - self._stock.surface(now.place) <= self.mount.tool.touch

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from dobot_async.magician.params import ColorPort, InfraredPort
+from dobot_async.magician.params import AccessoryVersion, ColorPort, InfraredPort
 from dobot_async.simulator.scene.geometry import Place3
 
 __all__ = [
@@ -120,6 +120,7 @@ class LightBeam:
         port: The socket, for `get_infrared`.
         pin: The input (a pin, 1 to 20) whose level is 1 while it sees something; of a myCobot, a pin of the Atom.
         arm: The name of the arm that it is plugged into.
+        version: Which sensor it is. At a socket that was switched on for the other version it sees nothing.
     """
 
     at: Place3
@@ -127,6 +128,7 @@ class LightBeam:
     port: InfraredPort | None = None
     pin: int | None = None
     arm: str = ""
+    version: AccessoryVersion = AccessoryVersion.V1
 
     def __post_init__(self) -> None:
         check(self)
@@ -143,12 +145,14 @@ class ColorSpot:
         to: How far it sees.
         port: The socket; `get_color` tells of it while this socket's sensor is switched on.
         arm: The name of the arm that it is plugged into.
+        version: Which sensor it is. At a socket that was switched on for the other version it sees nothing.
     """
 
     at: Place3
     to: Place3
     port: ColorPort = ColorPort.GP2
     arm: str = ""
+    version: AccessoryVersion = AccessoryVersion.V1
 
     def __post_init__(self) -> None:
         check(self)

@@ -17,6 +17,7 @@ class UltraArmInScene:
     """An ultraArm; the tip hangs below what its coordinates tell."""
 
     rail = 0.0
+    switches = None
 
     def __init__(self, arm: SimulatedUltraArm) -> None:
         self.arm = arm
