@@ -124,7 +124,8 @@ async def measured(kind: str, motions: int) -> Row:
     loop, rng = asyncio.get_running_loop(), random.Random(SEED)
     began = loop.time()
     late, took = [], 0.0
-    async with simulate(model) as sim, family.connect(sim.url.replace("sim://", "slow://")) as arm:
+    homed: dict[str, Any] = {} if family is MyCobot else {"homed": True}
+    async with simulate(model, **homed) as sim, family.connect(sim.url.replace("sim://", "slow://")) as arm:
         sent = arm.link.stats.sent
         for _ in range(motions):
             before = loop.time()
