@@ -21,6 +21,7 @@ HOMES = {
         "MotionUnknown",
         "ProtocolError",
         "ReplyTimeout",
+        "UnsupportedError",
     ),
     "fleet.fleet": ("Fleet",),
     "_core.link.link": ("Link",),

@@ -14,6 +14,7 @@ from dobot_async.errors import (
     MotionUnknown,
     ProtocolError,
     ReplyTimeout,
+    UnsupportedError,
 )
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.magician.alarms import Alarm
@@ -94,6 +95,7 @@ __all__ = [
     "UltraArmLimits",
     "Unexpected",
     "Unreachable",
+    "UnsupportedError",
     "discover",
     "open_transport",
 ]

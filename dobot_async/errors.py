@@ -8,7 +8,8 @@
     ├── CommandRejected                      the arm answered that it will not do it
     ├── ArmAlarm                             the arm ended the motion with alarms
     ├── MotionStopped                        a stop or a clear ended the motion
-    └── MotionUnknown                        the motion may or may not run
+    ├── MotionUnknown                        the motion may or may not run
+    └── UnsupportedError                     the arm has no such thing, or its protocol does not give it
 
 Wrong arguments are `ValueError` or `TypeError` and are raised before a byte is sent.
 """
@@ -29,6 +30,7 @@ __all__ = [
     "MotionUnknown",
     "ProtocolError",
     "ReplyTimeout",
+    "UnsupportedError",
     "another",
 ]
 
@@ -77,6 +79,10 @@ class MotionStopped(DobotError):
 
 class MotionUnknown(DobotError):
     """Nothing can tell whether the motion runs; the arm was told to stop."""
+
+
+class UnsupportedError(DobotError):
+    """The arm has no such thing, or its protocol does not give it."""
 
 
 def another(error: E) -> E:

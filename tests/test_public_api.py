@@ -65,6 +65,7 @@ NAMES = [
     "UltraArmLimits",
     "Unexpected",
     "Unreachable",
+    "UnsupportedError",
     "discover",
     "open_transport",
 ]

@@ -1,0 +1,182 @@
+"""How long a drawing takes: it is drawn in the simulator, in no time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, SupportsFloat
+
+from dobot_async.magician import commands as m
+from dobot_async.magician import frame as magician_frame
+from dobot_async.magician.arm import Magician
+from dobot_async.magician.kinematics import Kinematics
+from dobot_async.mycobot import frame as cobot_frame
+from dobot_async.mycobot.arm import MyCobot
+from dobot_async.mycobot.models import MODELS, CobotModel
+from dobot_async.simulator.magician import MAGICIAN, SimulatedMagician
+from dobot_async.simulator.mycobot import SimulatedMyCobot
+from dobot_async.simulator.mycobot_body import MYCOBOT
+from dobot_async.simulator.ultraarm import ULTRAARM, SimulatedUltraArm
+from dobot_async.toolpath.drawing import RATE, TOLERANCE, planned
+from dobot_async.toolpath.moves import Kind, Tool, approach
+from dobot_async.toolpath.plane import Place, WorkPlane
+from dobot_async.toolpath.programs import CobotProgram, MagicianProgram, Pace, Program, UltraArmProgram
+from dobot_async.toolpath.toolpath import Toolpath
+from dobot_async.ultraarm import frame as ultraarm_frame
+from dobot_async.ultraarm.arm import UltraArm
+from dobot_async.wire import Command
+
+__all__ = ["Estimate", "estimate"]
+
+ROOM = 1_000_000
+END = 1e9  # seconds; by then every drawing is done
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """How long a drawing takes.
+
+    Attributes:
+        seconds: From where the arm stands after it was switched on to the end.
+        drawn: mm along strokes.
+        travel: mm beside them.
+        stroke_ends: For each stroke, after how many seconds it is done.
+    """
+
+    seconds: float
+    drawn: float
+    travel: float
+    stroke_ends: tuple[float, ...]
+
+
+@dataclass(slots=True)
+class Bench:
+    """A simulated arm that is told what to do by its bytes."""
+
+    arm: Any
+    encode: Callable[[Command[Any, Any], Any], bytes]
+    here: Place
+    program: Program
+
+    def put(self, row: Command[Any, Any], value: Any) -> None:
+        """Queue a command."""
+        self.session.receive(self.encode(row, value))
+
+    @property
+    def session(self) -> Any:
+        """A new client."""
+        return self.arm.session()
+
+
+def estimate(
+    toolpath: Toolpath,
+    plane: WorkPlane,
+    *,
+    arm: Any = "magician",
+    tool: Tool = "pen",
+    speed: SupportsFloat | None = None,
+    tolerance: SupportsFloat = TOLERANCE,
+    acceleration: float = 100.0,
+    percent: int = 20,
+    rate: SupportsFloat | None = RATE,
+) -> Estimate:
+    """Return how long a drawing takes, by drawing it with a simulated arm. It takes a second for some 10,000 points.
+
+    The arm is taken to have its usual speeds for moves above the paper (`PTPCommonParams` 50 % of a Magician).
+
+    Args:
+        toolpath: What to draw.
+        plane: Where the paper lies.
+        arm: A connected arm; or "magician", "ultraarm", or a myCobot's model.
+        tool: "pen" or "laser".
+        speed: As for `Drawing`; so are the others.
+        tolerance: mm.
+        acceleration: mm/s².
+        percent: Of a myCobot's speed.
+        rate: Commands per second.
+
+    Raises:
+        ValueError: The simulated arm cannot draw it: it tells the stroke.
+        TypeError: There is no simulator for this.
+    """
+    now = 0.0
+    bench = bench_of(arm, lambda: now, tool, Pace(acceleration, percent))
+    path = toolpath.simplify(tolerance)
+    strokes = planned(path, plane, tool, speed, rate)
+    moves = [move for some in strokes for move in some]
+    if not moves:
+        return Estimate(0.0, 0.0, 0.0, ())
+
+    instructions = list(bench.program.instructions(approach(bench.here, moves, plane) + moves))
+    for each in instructions:
+        bench.put(each.row, each.value)
+
+    now = END
+    done = [record for record in bench.arm.executed if record.index is not None]
+    ends: dict[int, float] = {}
+    for each, record in zip(instructions, done, strict=False):
+        stroke = each.move.stroke if each.move else None
+        if record.outcome != "done":
+            raise ValueError(f"stroke {stroke} cannot be drawn by the simulated arm")
+
+        if each.move and each.move.kind in {Kind.DRAW, Kind.LIFT}:
+            ends[each.move.stroke] = record.finished
+
+    if len(done) < len(instructions):
+        raise ValueError(f"stroke {len(ends)} cannot be drawn by the simulated arm")
+
+    return Estimate(done[-1].finished, path.length, path.travel, tuple(ends.values()))
+
+
+def magician(kinematics: Kinematics, clock: Callable[[], float], tool: Tool, pace: Pace) -> Bench:
+    """A Magician with its tool, at home."""
+    arm = SimulatedMagician(clock, replace(MAGICIAN, capacity=ROOM, keep=None), limits=kinematics.limits)
+    bias = m.EndEffectorParams(kinematics.x_bias, kinematics.y_bias, kinematics.z_bias)
+
+    def encode(row: Command[Any, Any], value: Any) -> bytes:
+        return bytes(magician_frame.request(row, row.request.encode(value), queued=True))
+
+    bench = Bench(arm, encode, (0.0, 0.0, 0.0), MagicianProgram(kinematics, arm.pose.j4, tool, pace))
+    arm.perform(m.SET_END_EFFECTOR_PARAMS, bias)
+    bench.here = (arm.pose.x, arm.pose.y, arm.pose.z)
+    return bench
+
+
+def ultraarm(_: Any, clock: Callable[[], float], tool: Tool, __: Pace) -> Bench:
+    """An ultraArm at home."""
+    arm = SimulatedUltraArm(clock, replace(ULTRAARM, capacity=ROOM, keep=None))
+
+    def encode(row: Command[Any, Any], value: Any) -> bytes:
+        return bytes(ultraarm_frame.encode(row, row.request.encode(value), queued=True))
+
+    here = home_of_ultraarm(arm)
+    return Bench(arm, encode, here, UltraArmProgram(tool, here))
+
+
+def home_of_ultraarm(arm: SimulatedUltraArm) -> Place:
+    """Where it stands."""
+    coords = arm.coords
+    return coords.x, coords.y, coords.z
+
+
+def cobot(model: CobotModel, clock: Callable[[], float], _: Tool, pace: Pace) -> Bench:
+    """A myCobot, with a hand that looks down."""
+    arm = SimulatedMyCobot(clock, replace(MYCOBOT, capacity=ROOM, keep=None), model=model.name)
+
+    def encode(row: Command[Any, Any], value: Any) -> bytes:
+        own = model.row(row)
+        return bytes(cobot_frame.request(own, own.request.encode(value), queued=True))
+
+    return Bench(arm, encode, (0.0, 0.0, 0.0), CobotProgram((), pace))
+
+
+def bench_of(arm: Any, clock: Callable[[], float], tool: Tool, pace: Pace) -> Bench:
+    """A simulated arm like another one."""
+    if isinstance(arm, (Magician, Kinematics)) or arm == "magician":
+        kinematics = arm if isinstance(arm, Kinematics) else getattr(arm, "kinematics", Kinematics())
+        return magician(kinematics, clock, tool, pace)
+
+    if isinstance(arm, UltraArm) or arm == "ultraarm":
+        return ultraarm(arm, clock, tool, pace)
+
+    raise TypeError(f"nothing estimates a drawing of {arm!r}; there are: magician, ultraarm")
