@@ -4,7 +4,7 @@
     4 pairs and more  homography: right for a camera that looks from anywhere, without distortion of its lens;
                       pairs that do not fit the others are found (RANSAC), told, and left out
 
-Numbers are scaled about their middle before they are solved for, without which pixels in the thousands leave few digits.
+Numbers are scaled about their middle before they are solved for, for pixels in the thousands would leave few digits.
 """
 
 from __future__ import annotations
@@ -20,15 +20,12 @@ from random import Random
 from typing import Self, SupportsFloat, cast
 
 from dobot_async._core.util.arguments import to_float
+from dobot_async._core.util.projective import Pair, Rows, inverse, mapped, solved
 
 __all__ = ["Calibration"]
 
-Pair = tuple[float, float]
-Rows = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 TRIES = 500
 KIND = "dobot_async calibration"
-FLAT = 1e-4  # of a triangle's longest side squared, its area: less is three points on a line
-LEAST = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,21 +122,13 @@ class Calibration:
         """Return what `to_json` has written; raise ValueError for anything else."""
         try:
             found = json.loads(text)
-            if found["kind"] != KIND:
-                raise ValueError(f"its kind is {found['kind']!r}")
-
-            numbers = [[float(number) for number in row] for row in found["matrix"]]
-            if [len(row) for row in numbers] != [3, 3, 3] or not all(map(math.isfinite, itertools.chain(*numbers))):
-                raise ValueError("its matrix is not three rows of three finite numbers")
-
-            matrix = cast(Rows, tuple(map(tuple, numbers)))
+            numbers = tuple(tuple(float(number) for number in row) for row in found["matrix"])
             residuals, used = tuple(map(float, found["residuals"])), tuple(map(bool, found["used"]))
-            if len(residuals) != len(used):
-                raise ValueError("it has not as many residuals as pairs")
+            check_saved(found["kind"], numbers, residuals, used)
         except (ValueError, TypeError, KeyError, RecursionError) as error:
             raise ValueError(f"this is no calibration: {error}") from None
 
-        return cls(matrix, residuals, used)
+        return cls(cast(Rows, numbers), residuals, used)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write it to a JSON file."""
@@ -152,6 +141,20 @@ class Calibration:
             return cls.from_json(Path(path).read_text(encoding="utf-8"))
         except ValueError as error:
             raise ValueError(f"{Path(path).name}: {error}") from None
+
+
+def check_saved(
+    kind: object, matrix: Sequence[Sequence[float]], residuals: Sequence[float], used: Sequence[bool]
+) -> None:
+    """Raise ValueError for what `to_json` has not written."""
+    if kind != KIND:
+        raise ValueError(f"its kind is {kind!r}")
+
+    if [len(row) for row in matrix] != [3, 3, 3] or not all(map(math.isfinite, itertools.chain(*matrix))):
+        raise ValueError("its matrix is not three rows of three finite numbers")
+
+    if len(residuals) != len(used):
+        raise ValueError("it has not as many residuals as pairs")
 
 
 def inliers(places: Sequence[Pair], targets: Sequence[Pair], limit: float, random: Random) -> list[int]:
@@ -186,126 +189,12 @@ def inliers(places: Sequence[Pair], targets: Sequence[Pair], limit: float, rando
     return best
 
 
-def solved(places: Sequence[Pair], targets: Sequence[Pair]) -> Rows | None:
-    """The map of three pairs, or the best one of more; None where they lie on a line."""
-    if on_a_line(places) or on_a_line(targets):
-        return None
-
-    before, after = normal(places), normal(targets)
-    ps, ts = ([mapped(matrix, each) for each in some] for matrix, some in ((before, places), (after, targets)))
-    affine = len(places) == 3
-    equations = [row for (u, v), (x, y) in zip(ps, ts, strict=True) for row in equations_of(u, v, x, y, affine=affine)]
-    found = least_squares(equations, 6 if affine else 8)
-    if found is None:
-        return None
-
-    a, b, c, d, e, f, *rest = found
-    g, h = rest or (0.0, 0.0)
-    matrix = times(times(inverse(after), ((a, b, c), (d, e, f), (g, h, 1.0))), before)
-    scale = weight(matrix, places[0])
-    if abs(scale) < LEAST or not all(map(math.isfinite, itertools.chain(*matrix))):
-        return None
-
-    if any(weight(matrix, place) / scale < LEAST for place in places):
-        return None  # the horizon runs between the points: no camera sees that
-
-    return cast(Rows, tuple(tuple(number / scale for number in row) for row in matrix))
-
-
-def equations_of(u: float, v: float, x: float, y: float, *, affine: bool) -> list[list[float]]:
-    """Two equations of a pair, each with its right side last."""
-    if affine:
-        return [[u, v, 1, 0, 0, 0, x], [0, 0, 0, u, v, 1, y]]
-
-    return [[u, v, 1, 0, 0, 0, -u * x, -v * x, x], [0, 0, 0, u, v, 1, -u * y, -v * y, y]]
-
-
-def least_squares(equations: Sequence[Sequence[float]], count: int) -> list[float] | None:
-    """The unknowns that fit best (Householder), None where the equations leave some open."""
-    rows = [list(row) for row in equations]
-    for column in range(count):
-        norm = math.sqrt(math.fsum(row[column] ** 2 for row in rows[column:]))
-        if norm < LEAST:
-            return None
-
-        norm = math.copysign(norm, -rows[column][column])
-        mirror = [row[column] for row in rows[column:]]
-        mirror[0] -= norm
-        square = math.fsum(value * value for value in mirror)
-        for place in range(column, count + 1):
-            share = 2 * math.fsum(m * row[place] for m, row in zip(mirror, rows[column:], strict=True)) / square
-            for m, row in zip(mirror, rows[column:], strict=True):
-                row[place] -= share * m
-
-    found = [0.0] * count
-    for place in range(count - 1, -1, -1):
-        rest = math.fsum(rows[place][other] * found[other] for other in range(place + 1, count))
-        found[place] = (rows[place][count] - rest) / rows[place][place]
-
-    return found
-
-
-def on_a_line(points: Sequence[Pair]) -> bool:
-    """Whether no three of some points are a triangle, or four of four are none: three of four on a line leave it open."""
-    flat = [is_flat(*three) for three in itertools.combinations(points[:12], 3)]
-    return any(flat) if len(points) <= 4 else all(flat)
-
-
-def is_flat(a: Pair, b: Pair, c: Pair) -> bool:
-    """Whether three points are as good as on a line."""
-    area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-    return area <= FLAT * max(math.dist(a, b), math.dist(b, c), math.dist(a, c)) ** 2
-
-
-def normal(points: Sequence[Pair]) -> Rows:
-    """What brings points to the origin, about 1 from it."""
-    x, y = (math.fsum(values) / len(points) for values in zip(*points, strict=True))
-    size = math.fsum(math.dist(point, (x, y)) for point in points) / len(points) or 1.0
-    return ((1 / size, 0.0, -x / size), (0.0, 1 / size, -y / size), (0.0, 0.0, 1.0))
-
-
-def weight(matrix: Rows, point: Pair) -> float:
-    """The third number of a mapped point; above 0 on the side of the horizon on which the points are."""
-    return matrix[2][0] * point[0] + matrix[2][1] * point[1] + matrix[2][2]
-
-
-def mapped(matrix: Rows, point: Pair) -> Pair:
-    """A point, mapped."""
-    u, v = point
-    w = weight(matrix, point)
-    if w < LEAST:
-        raise ValueError(f"({u:g}, {v:g}) is on the camera's horizon, or beyond it")
-
-    x, y = (row[0] * u + row[1] * v + row[2] for row in matrix[:2])
-    return x / w, y / w
-
-
 def miss(matrix: Rows, place: Pair, target: Pair) -> float:
     """How far a map misses, mm; infinite beyond the horizon."""
     try:
         return math.dist(mapped(matrix, place), target)
     except ValueError:
         return math.inf
-
-
-def times(a: Rows, b: Rows) -> Rows:
-    """The product of two matrices."""
-    columns = list(zip(*b, strict=True))
-    return cast(
-        Rows, tuple(tuple(sum(p * q for p, q in zip(row, column, strict=True)) for column in columns) for row in a)
-    )
-
-
-def inverse(matrix: Rows) -> Rows:
-    """The inverse of a matrix."""
-    (a, b, c), (d, e, f), (g, h, i) = matrix
-    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    adjugate = (
-        (e * i - f * h, c * h - b * i, b * f - c * e),
-        (f * g - d * i, a * i - c * g, c * d - a * f),
-        (d * h - e * g, b * g - a * h, a * e - b * d),
-    )
-    return cast(Rows, tuple(tuple(number / determinant for number in row) for row in adjugate))
 
 
 def pair(value: object, name: str) -> Pair:

@@ -1,6 +1,7 @@
 """The way of the imports, read from the source: layers know nothing of higher ones, and families not of each other.
 
-errors <- wire, util <- transports <- link <- queue <- arms <- families <- discovery <- simulator <- toolpath <- cli <- __main__
+errors <- wire, util <- transports <- link <- queue <- arms <- families <- discovery <- simulator <- toolpath <- cli
+<- __main__
 """
 
 from __future__ import annotations

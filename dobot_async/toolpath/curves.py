@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 __all__ = ["MOST", "arc", "bezier"]
 
@@ -25,7 +26,7 @@ def bezier(tolerance: float, *controls: complex) -> list[complex]:
     def at(share: float) -> complex:
         points = list(controls)
         while len(points) > 1:
-            points = [a + (b - a) * share for a, b in zip(points, points[1:], strict=False)]
+            points = [a + (b - a) * share for a, b in pairwise(points)]
         return points[0]
 
     return [*(at(number / count) for number in range(1, count)), controls[-1]]

@@ -1,7 +1,7 @@
 """An arm draws, or engraves, a toolpath.
 
-    toolpath --moves--> checked against the reach --program--> commands --batches--> arm.queue --> done, stroke by stroke
-                        before a byte is sent                   a full queue makes them wait
+    toolpath --moves--> checked against the reach --program--> commands --batches--> arm.queue --> done
+                        before a byte is sent                            a full queue makes them wait
 
 1. All of it is checked first: a place out of reach is an error before anything moves.
 2. Commands follow each other without a WAIT and without another one between them, so that the arm's look-ahead sees a
@@ -13,35 +13,41 @@
 from __future__ import annotations
 
 import asyncio
-import math
+import logging
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any, SupportsFloat
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async._core.util.arguments import check_duration, to_float
-from dobot_async.errors import MotionStopped, another
+from dobot_async._core.util.arguments import check_duration
+from dobot_async._core.util.tasks import cancel_and_join
+from dobot_async.errors import DobotError, MotionStopped, another
 from dobot_async.magician.arm import Magician
 from dobot_async.mycobot.arm import MyCobot
-from dobot_async.toolpath.moves import Kind, Move, Tool, approach, check_moves, fastest, moves_of
+from dobot_async.toolpath.moves import Move, Tool, approach, check_moves
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.programs import Instruction, Pace, check_tool, program_for
 from dobot_async.toolpath.reach import reach_of
+from dobot_async.toolpath.schedule import (
+    RATE,
+    TOLERANCE,
+    above_zero,
+    batches,
+    guess,
+    planned,
+    whole,
+    whole_percent,
+)
 from dobot_async.toolpath.toolpath import Toolpath
 from dobot_async.ultraarm.arm import UltraArm
 
 __all__ = ["Arm", "Drawing", "Progress", "draw", "engrave"]
 
+logger = logging.getLogger("dobot_async.toolpath")
 Arm = Magician | UltraArm | MyCobot
-SPEEDS: dict[Tool, float] = {"pen": 50.0, "laser": 20.0}
-TOLERANCE = 0.05  # mm; a third of what an arm repeats
-BATCH = 24  # commands that are put together: fewer than an arm's queue holds
 LOOK = 0.5  # seconds between two questions how far the arm is, while commands are sent: each takes the line for a while
-RATE = 120.0  # commands per second that a line of 115200 baud carries with room to spare
-DEPTH = 24  # commands that lie ready in the arm while more come
-PER_MOVE = 0.15  # seconds that a move of the pen takes beside its way, for the first guess of the time that is left
 LEAST_KNOWN = 0.05  # of the time that was guessed, before how long it really takes is believed
 
 
@@ -123,6 +129,7 @@ class Drawing:
         self._progress = progress
         self._running: asyncio.Task[Any] | None = None
         self._stopped = False
+        self._began = 0.0
         self._taken = (0.0, 0.0)  # seconds that what is done has taken, and was guessed to take
         self.next_stroke = 0
 
@@ -178,27 +185,31 @@ class Drawing:
     async def _draw(self, instructions: Sequence[Instruction]) -> None:
         """Put all commands, and wait until they are done; on another way out, stop."""
         pending: deque[tuple[Motion, int]] = deque()
+        self._began = asyncio.get_running_loop().time()
+        watcher = asyncio.create_task(self._watch(pending), name="dobot_async progress of a drawing")
         try:
             await self._put(instructions, pending)
             while pending:
                 await pending[0][0]
-                self._note(pending)
+                self._count(pending)
         except BaseException as error:
-            error.add_note(
-                f"stroke {self.next_stroke} of {len(self._strokes)} (from 0) was not done; "
-                f"first={self.next_stroke} goes on with it"
-            )
             cleanup = self._arm.link.cleanup
             failure = await cleanup.finish(cleanup.start(self._arm.leave(), "the end of a drawing"))
+            self._count(pending)
+            error.add_note(
+                f"stroke {self.next_stroke} of {len(self._strokes)} (from 0) is not known to be done; "
+                f"first={self.next_stroke} goes on with it"
+            )
             if failure:
                 error.add_note(f"it is not known whether the arm stands, and its laser is off: {failure}")
 
             raise
+        finally:
+            await cancel_and_join(watcher)
 
     async def _put(self, instructions: Sequence[Instruction], pending: deque[tuple[Motion, int]]) -> None:
-        """Put commands in batches; note the last one of each stroke, and what is done meanwhile."""
-        clock = asyncio.get_running_loop().time
-        looked = self._began = clock()
+        """Put commands in batches; note the last one of each stroke."""
+        motions: list[Motion] = []
         for some in batches(instructions):
             if self._stopped:
                 raise MotionStopped("the drawing was stopped")
@@ -211,32 +222,41 @@ class Drawing:
                 for motion, (each, ends) in zip(motions, some, strict=True)
                 if ends and each.move
             )
-            if clock() > looked + LOOK:
-                looked = clock()
-                await self._arm.queue.update()
-
-            self._note(pending)
+            if failure := self._count(pending):
+                raise another(failure)
 
         pending.append((motions[-1], len(self._strokes) - 1))
 
-    def _note(self, pending: deque[tuple[Motion, int]]) -> None:
-        """Count the strokes that are done; raise what one has failed with."""
-        before = self.next_stroke
-        while pending and pending[0][0].ended:
+    async def _watch(self, pending: deque[tuple[Motion, int]]) -> None:
+        """Ask now and then how far the arm is: no more often, for each question takes the line for a while."""
+        while True:
+            await asyncio.sleep(LOOK)
+            with suppress(DobotError):  # whoever puts and waits hears of it
+                await self._arm.queue.update()
+
+            self._count(pending)
+
+    def _count(self, pending: deque[tuple[Motion, int]]) -> DobotError | None:
+        """Count the strokes that are done; return what the first one that is not has failed with."""
+        before, failure = self.next_stroke, None
+        while pending and pending[0][0].ended and not failure:
             motion, stroke = pending[0]
             failure = motion.exception()
-            if failure:
-                raise another(failure)
-
-            pending.popleft()
-            self.next_stroke = max(self.next_stroke, stroke + 1)
+            if not failure:
+                pending.popleft()
+                self.next_stroke = max(self.next_stroke, stroke + 1)
 
         if self.next_stroke > before:
             now = asyncio.get_running_loop().time()
             guessed = self._taken[1] + sum(self._guess[before : self.next_stroke])
             self._taken = now - self._began, guessed
             if self._progress:
-                self._progress(self.progress)
+                try:
+                    self._progress(self.progress)
+                except Exception:
+                    logger.exception("progress= of a drawing failed")
+
+        return failure
 
 
 async def draw(arm: Arm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:
@@ -259,68 +279,3 @@ async def engrave(arm: Arm, toolpath: Toolpath, plane: WorkPlane, *, first: int 
     a line of 0.1 mm.
     """
     await Drawing(arm, toolpath, plane, tool="laser", **options).run(first=first)
-
-
-def planned(
-    path: Toolpath, plane: WorkPlane, tool: Tool, speed: SupportsFloat | None, rate: SupportsFloat | None
-) -> list[list[Move]]:
-    """The moves of each stroke, at speeds at which the line keeps up."""
-    given = None if speed is None else above_zero(speed, "speed")
-    speeds = [given or stroke.speed or SPEEDS[tool] for stroke in path]
-    strokes = moves_of(path, plane, tool, speeds)
-    if rate is None:
-        return strokes
-
-    most = fastest([move for moves in strokes for move in moves], above_zero(rate, "rate"), DEPTH)
-    return strokes if most >= max(speeds) else moves_of(path, plane, tool, [min(each, most) for each in speeds])
-
-
-def batches(instructions: Sequence[Instruction]) -> Iterator[list[tuple[Instruction, bool]]]:
-    """Commands in pieces, each with whether it is the last one of its stroke."""
-    ends = [False] * len(instructions)
-    last: dict[int, int] = {}
-    for number, each in enumerate(instructions):
-        if each.move and each.move.kind in {Kind.DRAW, Kind.LIFT}:
-            last[each.move.stroke] = number
-
-    for number in last.values():
-        ends[number] = True
-
-    marked = iter(list(zip(instructions, ends, strict=True)))
-    while some := list(islice(marked, BATCH)):
-        yield some
-
-
-def guess(moves: Sequence[Move]) -> float:
-    """About how many seconds a stroke takes."""
-    ways = zip(moves, moves[1:], strict=False)
-    along = sum(math.dist(a.place, b.place) / b.speed for a, b in ways)
-    return along + PER_MOVE * sum(move.kind is not Kind.DRAW for move in moves)
-
-
-def above_zero(value: SupportsFloat, name: str) -> float:
-    """A finite number above 0."""
-    found = to_float(value, name)
-    if not 0 < found < math.inf:
-        raise ValueError(f"{name} must be above 0 and finite, not {value!r}")
-
-    return found
-
-
-def whole_percent(value: Any) -> int:
-    """1 to 100."""
-    if not hasattr(value, "__index__") or not 1 <= value <= 100:
-        raise ValueError(f"percent must be a whole number, 1 to 100, not {value!r}")
-
-    return int(value)
-
-
-def whole(value: Any, count: int) -> int:
-    """The number of a stroke."""
-    if not hasattr(value, "__index__"):
-        raise TypeError(f"first must be the number of a stroke, not {value!r}")
-
-    if not 0 <= value < count:
-        raise ValueError(f"first must be in 0 to {count - 1}, for there are {count} strokes, not {value!r}")
-
-    return int(value)

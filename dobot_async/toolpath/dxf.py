@@ -45,17 +45,22 @@ def read_dxf(source: Source, *, tolerance: float = FINE, unit: float | None = No
     with library():
         import ezdxf
         from ezdxf import disassemble, units
+        from ezdxf.enums import InsertUnits
+        from ezdxf.lldxf.const import DXFError
 
     check_tolerance(tolerance)
     name = name_of(source)
     try:
         document = document_of(content(source), ezdxf)
-    except (ezdxf.DXFError, ValueError, UnicodeError, IndexError, KeyError, AttributeError, TypeError) as error:
+    except (DXFError, ValueError, UnicodeError, IndexError, KeyError, AttributeError, TypeError) as error:
         reason = " ".join((str(error) or type(error).__name__).split())
         raise ToolpathFileError(name, place_of(reason), f"ezdxf cannot read it: {reason}") from None
 
     if unit is None:
-        unit = units.conversion_factor(document.units, units.MM) if document.units else 1.0
+        try:
+            unit = units.conversion_factor(InsertUnits(document.units), InsertUnits.Millimeters) if document.units else 1
+        except ValueError:
+            raise ToolpathFileError(name, "$INSUNITS", f"{document.units} is no unit; give unit= in mm") from None
     elif not check_duration(unit, "unit"):
         raise ValueError("unit must be above 0 mm")
 
@@ -72,7 +77,7 @@ def read_dxf(source: Source, *, tolerance: float = FINE, unit: float | None = No
                 Stroke(tuple((x * unit, y * unit) for x, y in line), layer=layer)
                 for line in lines(entity, tolerance / unit, place)
             ]
-        except (ezdxf.DXFError, ValueError, TypeError, AttributeError, ZeroDivisionError, OverflowError) as error:
+        except (DXFError, ValueError, TypeError, AttributeError, ZeroDivisionError, OverflowError) as error:
             raise ToolpathFileError(name, place, str(error) or type(error).__name__) from None
 
     return Toolpath(tuple(strokes))

@@ -45,7 +45,8 @@ class UnreachableStroke(Unreachable):
         self, stroke: int, point: int, place: tuple[float, float, float], reason: str, *, alarm: int = BEYOND_LIMIT
     ) -> None:
         where = ", ".join(f"{number:.1f}" for number in place)
-        super().__init__(f"stroke {stroke}, point {point}: ({where}) cannot be reached: {reason}", alarm)
+        what = reason if reason.startswith(f"({where})") else f"({where}) is out of reach: {reason}"
+        super().__init__(f"stroke {stroke}, point {point}: {what}", alarm)
         self.stroke = stroke
         self.point = point
         self.place = place

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, SupportsFloat
 
+from dobot_async.errors import UnsupportedError
 from dobot_async.magician import commands as m
 from dobot_async.magician import frame as magician_frame
 from dobot_async.magician.arm import Magician
@@ -17,10 +18,10 @@ from dobot_async.simulator.magician import MAGICIAN, SimulatedMagician
 from dobot_async.simulator.mycobot import SimulatedMyCobot
 from dobot_async.simulator.mycobot_body import MYCOBOT
 from dobot_async.simulator.ultraarm import ULTRAARM, SimulatedUltraArm
-from dobot_async.toolpath.drawing import RATE, TOLERANCE, planned
 from dobot_async.toolpath.moves import Kind, Tool, approach
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.programs import CobotProgram, MagicianProgram, Pace, Program, UltraArmProgram
+from dobot_async.toolpath.schedule import RATE, TOLERANCE, planned
 from dobot_async.toolpath.toolpath import Toolpath
 from dobot_async.ultraarm import frame as ultraarm_frame
 from dobot_async.ultraarm.arm import UltraArm
@@ -49,23 +50,27 @@ class Estimate:
     stroke_ends: tuple[float, ...]
 
 
-@dataclass(slots=True)
 class Bench:
-    """A simulated arm that is told what to do by its bytes."""
+    """A simulated arm that is told what to do by its bytes.
 
-    arm: Any
-    encode: Callable[[Command[Any, Any], Any], bytes]
-    here: Place
-    program: Program
+    Attributes:
+        arm: The simulated arm.
+        here: Where it stands.
+        program: How it is told.
+    """
+
+    def __init__(
+        self, arm: Any, encode: Callable[[Command[Any, Any], bytes], bytes], here: Place, program: Program
+    ) -> None:
+        self.arm = arm
+        self.here = here
+        self.program = program
+        self._encode = encode
+        self._session = arm.session()
 
     def put(self, row: Command[Any, Any], value: Any) -> None:
         """Queue a command."""
-        self.session.receive(self.encode(row, value))
-
-    @property
-    def session(self) -> Any:
-        """A new client."""
-        return self.arm.session()
+        self._session.receive(self._encode(row, row.request.encode(value)))
 
 
 def estimate(
@@ -100,12 +105,13 @@ def estimate(
         TypeError: There is no simulator for this.
     """
     now = 0.0
-    bench = bench_of(arm, lambda: now, tool, Pace(acceleration, percent))
     path = toolpath.simplify(tolerance)
-    strokes = planned(path, plane, tool, speed, rate)
+    strokes = planned(path, plane, tool, speed, rate) if path.strokes else []
     moves = [move for some in strokes for move in some]
     if not moves:
         return Estimate(0.0, 0.0, 0.0, ())
+
+    bench = bench_of(arm, lambda: now, tool, Pace(acceleration, percent), moves[0].place)
 
     instructions = list(bench.program.instructions(approach(bench.here, moves, plane) + moves))
     for each in instructions:
@@ -132,51 +138,63 @@ def magician(kinematics: Kinematics, clock: Callable[[], float], tool: Tool, pac
     """A Magician with its tool, at home."""
     arm = SimulatedMagician(clock, replace(MAGICIAN, capacity=ROOM, keep=None), limits=kinematics.limits)
     bias = m.EndEffectorParams(kinematics.x_bias, kinematics.y_bias, kinematics.z_bias)
-
-    def encode(row: Command[Any, Any], value: Any) -> bytes:
-        return bytes(magician_frame.request(row, row.request.encode(value), queued=True))
-
-    bench = Bench(arm, encode, (0.0, 0.0, 0.0), MagicianProgram(kinematics, arm.pose.j4, tool, pace))
     arm.perform(m.SET_END_EFFECTOR_PARAMS, bias)
-    bench.here = (arm.pose.x, arm.pose.y, arm.pose.z)
-    return bench
+    pose = arm.pose
+    program = MagicianProgram(kinematics, pose.j4, tool, pace)
+    return Bench(arm, lambda row, data: bytes(magician_frame.request(row, data, queued=True)), place_of(pose), program)
 
 
-def ultraarm(_: Any, clock: Callable[[], float], tool: Tool, __: Pace) -> Bench:
+def ultraarm(clock: Callable[[], float], tool: Tool) -> Bench:
     """An ultraArm at home."""
     arm = SimulatedUltraArm(clock, replace(ULTRAARM, capacity=ROOM, keep=None))
-
-    def encode(row: Command[Any, Any], value: Any) -> bytes:
-        return bytes(ultraarm_frame.encode(row, row.request.encode(value), queued=True))
-
-    here = home_of_ultraarm(arm)
-    return Bench(arm, encode, here, UltraArmProgram(tool, here))
-
-
-def home_of_ultraarm(arm: SimulatedUltraArm) -> Place:
-    """Where it stands."""
-    coords = arm.coords
-    return coords.x, coords.y, coords.z
+    here = place_of(arm.pose)
+    return Bench(
+        arm,
+        lambda row, data: bytes(ultraarm_frame.encode(row, data, queued=True)),
+        here,
+        UltraArmProgram(tool, here),
+    )
 
 
-def cobot(model: CobotModel, clock: Callable[[], float], _: Tool, pace: Pace) -> Bench:
-    """A myCobot, with a hand that looks down."""
+def cobot(model: CobotModel, clock: Callable[[], float], pace: Pace, first: Place) -> Bench:
+    """A myCobot that stands above the first stroke, with a hand that looks down."""
     arm = SimulatedMyCobot(clock, replace(MYCOBOT, capacity=ROOM, keep=None), model=model.name)
+    rotation = (180.0, 0.0, 0.0) if len(model.reach) == 6 else (0.0,)
+    joints = arm.ways.solver.inverse((*first, *rotation), arm.joints, arm.ways.limits)
+    if joints is None:
+        where = ", ".join(f"{number:.1f}" for number in first)
+        raise ValueError(
+            f"stroke 0 cannot be drawn by the simulated arm: ({where}) is out of reach of a hand that looks down"
+        )
 
-    def encode(row: Command[Any, Any], value: Any) -> bytes:
-        own = model.row(row)
-        return bytes(cobot_frame.request(own, own.request.encode(value), queued=True))
+    arm.place(*joints)
 
-    return Bench(arm, encode, (0.0, 0.0, 0.0), CobotProgram((), pace))
+    def encode(row: Command[Any, Any], data: bytes) -> bytes:
+        return bytes(cobot_frame.request(model.row(row), data, queued=True))
+
+    return Bench(arm, encode, first, CobotProgram(rotation, pace))
 
 
-def bench_of(arm: Any, clock: Callable[[], float], tool: Tool, pace: Pace) -> Bench:
+def place_of(pose: Any) -> Place:
+    """Where a tool is."""
+    return pose.x, pose.y, pose.z
+
+
+def bench_of(arm: Any, clock: Callable[[], float], tool: Tool, pace: Pace, first: Place) -> Bench:
     """A simulated arm like another one."""
     if isinstance(arm, (Magician, Kinematics)) or arm == "magician":
-        kinematics = arm if isinstance(arm, Kinematics) else getattr(arm, "kinematics", Kinematics())
-        return magician(kinematics, clock, tool, pace)
+        return magician(
+            arm if isinstance(arm, Kinematics) else getattr(arm, "kinematics", Kinematics()), clock, tool, pace
+        )
 
     if isinstance(arm, UltraArm) or arm == "ultraarm":
-        return ultraarm(arm, clock, tool, pace)
+        return ultraarm(clock, tool)
 
-    raise TypeError(f"nothing estimates a drawing of {arm!r}; there are: magician, ultraarm")
+    model = arm.model if isinstance(arm, MyCobot) else arm if isinstance(arm, CobotModel) else MODELS.get(arm)
+    if model is None:
+        raise ValueError(f"nothing estimates a drawing of {arm!r}; there are: magician, ultraarm, {', '.join(MODELS)}")
+
+    if tool == "laser":
+        raise UnsupportedError(f"a {model.title} has no laser")
+
+    return cobot(model, clock, pace, first)

@@ -17,24 +17,19 @@ from __future__ import annotations
 
 import cmath
 import math
-import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from dobot_async._core.util.arguments import to_float
 from dobot_async.toolpath import curves
 from dobot_async.toolpath.errors import ToolpathFileError
+from dobot_async.toolpath.gcode_lines import INCH, Line, WrongLine, lines_of, low_of, switched
 from dobot_async.toolpath.sources import FINE, Source, check_tolerance, content, name_of
 from dobot_async.toolpath.stroke import FULL, Point, Stroke
 from dobot_async.toolpath.toolpath import Toolpath
 
 __all__ = ["read_gcode"]
 
-INCH = 25.4
-LONGEST = 1000  # characters of a line
-WORD = re.compile(r"\s*([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
-COMMENT = re.compile(r"\([^()]*\)|;.*")
-NOTHING = re.compile(r"\s*(?:%.*|\$.*|/.*)?\s*")
 UNTIDY = 0.01  # by how much radii of one arc may differ, as a share, and in mm
 BYTE = 255.0
 ARC_AXES = "IJKR"
@@ -44,18 +39,6 @@ IGNORED = frozenset({4, 17, 40, 43, 49, 53, 54, 55, 56, 57, 58, 59, 61, 64, 80, 
 
 class Misfit(ValueError):
     """What is wrong with a line."""
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """One line: its number, and its words in order."""
-
-    number: int
-    words: tuple[tuple[str, float], ...]
-
-    def get(self, letter: str) -> float | None:
-        """The number behind a letter, None if it is not there."""
-        return next((number for word, number in self.words if word == letter), None)
 
 
 @dataclass(slots=True)
@@ -94,7 +77,7 @@ class Machine:
         way = None
         for letter, number in line.words:
             if letter == "G":
-                way = self._g(number, line) or way
+                way = self._g(number) or way
             elif letter == "M":
                 self._m(int(number), line)
 
@@ -127,7 +110,7 @@ class Machine:
         lit = not self.switched or (self.on and self.power > 0)
         return lit and (self.low is None or self.z <= self.low)
 
-    def _g(self, number: float, line: Line) -> str | None:
+    def _g(self, number: float) -> str | None:
         """A G word; returns "set" and "home" for those whose axes are no way."""
         if number in SETTINGS:
             SETTINGS[number](self)
@@ -169,7 +152,7 @@ class Machine:
             self.origin = 0j
 
         here = self.place - self.origin
-        wanted = complex(*(old if new is None else new * self.unit for old, new in zip((here.real, here.imag), (x, y), strict=True)))
+        wanted = complex(here.real if x is None else x * self.unit, here.imag if y is None else y * self.unit)
         self.origin += here - wanted
 
     def _move(self, line: Line) -> None:
@@ -259,14 +242,16 @@ def set_(name: str, value: object) -> Callable[[Machine], None]:
 SETTINGS: Mapping[float, Callable[[Machine], None]] = {
     20: set_("unit", INCH),
     21: set_("unit", 1.0),
-    90: set_("absolute", True),  # noqa: FBT003
-    91: set_("absolute", False),  # noqa: FBT003
-    90.1: set_("arc_absolute", True),  # noqa: FBT003
-    91.1: set_("arc_absolute", False),  # noqa: FBT003
+    90: set_("absolute", True),
+    91: set_("absolute", False),
+    90.1: set_("arc_absolute", True),
+    91.1: set_("arc_absolute", False),
 }
 
 
-def read_gcode(source: Source, *, tolerance: float = FINE, full_power: float = 1000.0, pen_z: float | None = None) -> Toolpath:
+def read_gcode(
+    source: Source, *, tolerance: float = FINE, full_power: float = 1000.0, pen_z: float | None = None
+) -> Toolpath:
     """Read the G-code of a pen plotter or a laser, as LaserGRBL, Inkscape and Luban write it.
 
     Args:
@@ -289,10 +274,10 @@ def read_gcode(source: Source, *, tolerance: float = FINE, full_power: float = 1
     try:
         text = content(source).decode("utf-8-sig", errors="replace")
         program = list(lines_of(text))
-        machine = Machine(tolerance, float(full_power), switched(program), pen_z if pen_z is not None else low_of(program))
+        machine = Machine(
+            tolerance, float(full_power), switched(program), pen_z if pen_z is not None else low_of(program)
+        )
         for line in program:
-            if any(letter == "M" and number in {2, 30} for letter, number in line.words):
-                break
             try:
                 machine.run(line)
             except (ValueError, OverflowError) as error:
@@ -302,57 +287,3 @@ def read_gcode(source: Source, *, tolerance: float = FINE, full_power: float = 1
 
     machine.finish()
     return Toolpath(tuple(machine.strokes))
-
-
-class WrongLine(Exception):
-    """A line that is wrong, by its number."""
-
-    def __init__(self, number: int, reason: str) -> None:
-        super().__init__(reason)
-        self.number = number
-        self.reason = reason
-
-
-def lines_of(text: str) -> Iterator[Line]:
-    """The lines that say something."""
-    for number, given in enumerate(text.split("\n"), 1):
-        if len(given) > LONGEST:
-            raise WrongLine(number, f"more than {LONGEST} characters")
-
-        line = COMMENT.sub("", given.removesuffix("\r")).partition("*")[0]
-        words: list[tuple[str, float]] = []
-        place = 0
-        while place < len(line) and not NOTHING.fullmatch(line, place):
-            match = WORD.match(line, place)
-            if match is None:
-                raise WrongLine(number, f"column {place + 1}: {line[place:].strip()[:20]!r} is no word of G-code")
-
-            words.append((match[1].upper(), float(match[2])))
-            place = match.end()
-
-        if words:
-            yield Line(number, tuple(word for word in words if word[0] != "N"))
-
-
-def switched(program: list[Line]) -> bool:
-    """Whether a program switches a laser, a spindle or a servo on."""
-    return any(letter == "M" and number in {3, 4, 106} for line in program for letter, number in line.words)
-
-
-def low_of(program: list[Line]) -> float | None:
-    """The middle of the heights of a program, mm, None if there is but one."""
-    unit, absolute, z = 1.0, True, 0.0
-    heights: set[float] = set()
-    for line in program:
-        for letter, number in line.words:
-            if letter == "G" and number in {20, 21}:
-                unit = INCH if number == 20 else 1.0
-            elif letter == "G" and number in {90, 91}:
-                absolute = number == 90
-
-        given = line.get("Z")
-        if given is not None:
-            z = given * unit if absolute else z + given * unit
-            heights.add(z)
-
-    return (min(heights) + max(heights)) / 2 if len(heights) > 1 else None

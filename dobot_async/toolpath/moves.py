@@ -1,7 +1,7 @@
 """A toolpath on a work plane as the moves of an arm: no arm is known here, and nothing is sent.
 
-    pen     travel --lower--> draw draw draw --lift--> travel ...      the tool is lifted between strokes
-    laser   travel --lower--> draw draw draw, jump, draw draw ...      the laser is off between strokes, at one height
+pen     travel --lower--> draw draw draw --lift--> travel ...      the tool is lifted between strokes
+laser   travel --lower--> draw draw draw, jump, draw draw ...      the laser is off between strokes, at one height
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from dobot_async.toolpath.stroke import Point, Stroke, distance
 
@@ -60,9 +61,7 @@ class Ends:
     def __contains__(self, number: object) -> bool:
         return (number, False) in self._places
 
-    def nearest(
-        self, place: Point, within: float = math.inf, *, only: bool | None = None
-    ) -> tuple[int, bool] | None:
+    def nearest(self, place: Point, within: float = math.inf, *, only: bool | None = None) -> tuple[int, bool] | None:
         """Return the nearest end, None if there is none within so many mm: squares are looked at ring by ring.
 
         Args:
@@ -112,9 +111,10 @@ def square(x: int, y: int, ring: int) -> list[tuple[int, int]]:
 
 def side_for(strokes: Sequence[Stroke]) -> float:
     """Such a side that a square holds an end or two."""
-    xs, ys = zip(*(point for stroke in strokes for point in (stroke.start, stroke.end)), strict=True)
-    area = max(max(xs) - min(xs), 1e-6) * max(max(ys) - min(ys), 1e-6)
-    return max(math.sqrt(area / len(strokes)), (max(xs) - min(xs) + max(ys) - min(ys)) / 2000, 1e-6)
+    xs = [x for stroke in strokes for x, _ in (stroke.start, stroke.end)]
+    ys = [y for stroke in strokes for _, y in (stroke.start, stroke.end)]
+    width, height = max(xs) - min(xs), max(ys) - min(ys)
+    return max(math.sqrt(max(width, 1e-6) * max(height, 1e-6) / len(strokes)), (width + height) / 2000, 1e-6)
 
 
 def merged(strokes: Sequence[Stroke], tolerance: float, *, reverse: bool = True) -> list[Stroke]:
@@ -181,7 +181,7 @@ def chained(chain: Sequence[Stroke]) -> Stroke:
 
 def travel_of(strokes: Sequence[Stroke], start: Point | None) -> float:
     """How far the tool travels between strokes, and from `start` to the first."""
-    way = sum(distance(a.end, b.start) for a, b in zip(strokes, strokes[1:], strict=False))
+    way = sum(distance(a.end, b.start) for a, b in pairwise(strokes))
     return way + (distance(start, strokes[0].start) if start and strokes else 0.0)
 
 

@@ -1,8 +1,10 @@
 """A work plane: where the paper lies, in the arm's coordinates.
 
-                 y ^        lift  mm above the paper in which the tool travels
-       origin      |        press mm below the paper at full pressure (for a pen on a spring)
-         o---------+--> x   height, positive above the paper: along x cross y
+          y ^        lift  mm above the paper in which the tool travels
+origin      |        press mm below the paper at full pressure (for a pen on a spring)
+  o---------+--> x   height, positive above the paper: along x cross y
+
+The plane may lie aslant, but not upright.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ class MagicianProgram:
             yield self._instruction(move)
 
         if self._laser:
-            yield Instruction(m.SET_END_EFFECTOR_LASER, m.EndEffectorLaser(False, False), None)  # noqa: FBT003
+            yield Instruction(m.SET_END_EFFECTOR_LASER, m.EndEffectorLaser(False, False), None)
 
     def _instruction(self, move: Move) -> Instruction:
         if self._laser and move.kind in {Kind.DRAW, Kind.JUMP}:
@@ -132,7 +132,9 @@ class UltraArmProgram:
 
             speed = max(SLOWEST, min(FASTEST, move.speed))
             for x, y, z in self._pieces(move.place):
-                yield Instruction(STRAIGHT, u.CoordsMove(round(x, 2), round(y, 2), round(z, 2), f=round(speed, 2)), move)
+                yield Instruction(
+                    STRAIGHT, u.CoordsMove(round(x, 2), round(y, 2), round(z, 2), f=round(speed, 2)), move
+                )
 
         if self._laser:
             yield Instruction(u.SET_PWM, u.PWM(0), None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 from dobot_async.toolpath.stroke import Point, Stroke
 
@@ -15,7 +16,7 @@ def simplified(stroke: Stroke, tolerance: float) -> Stroke:
     points, powers = stroke.points, stroke.powers
     corners = [0, *(i for i in range(1, len(points) - 1) if powers[i] != powers[i + 1]), len(points) - 1]
     kept: list[int] = [0]
-    for first, last in zip(corners, corners[1:], strict=False):
+    for first, last in pairwise(corners):
         kept += [number for number in between(points, first, last, tolerance) if number > first]
 
     return stroke.part([points[i] for i in kept], [powers[i] for i in kept]) if len(kept) < len(points) else stroke

@@ -38,7 +38,7 @@ def split_stroke(stroke: Stroke, inside: Callable[[Point], bool], step: float) -
     yield stroke.part(points, powers), state
 
 
-def edge(a: Point, b: Point, inside: Callable[[Point], bool], state: bool) -> tuple[Point, Point]:  # noqa: FBT001
+def edge(a: Point, b: Point, inside: Callable[[Point], bool], state: bool) -> tuple[Point, Point]:
     """The last point as a is, and the first that is not, on the way from a to b."""
     while distance(a, b) > EDGE:
         middle = along(a, b, 0.5)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple, SupportsFloat, cast
+from typing import NamedTuple, SupportsFloat
 
 from dobot_async._core.util.arguments import to_float
 
@@ -50,7 +50,8 @@ class Matrix(NamedTuple):
     e: float
     f: float
 
-    def __call__(self, point: Point) -> Point:
+    def __call__(self, point: Point, /) -> Point:
+        """Return a point, mapped."""
         x, y = point
         return self.a * x + self.c * y + self.e, self.b * x + self.d * y + self.f
 
@@ -136,7 +137,7 @@ class Stroke:
 
     def transformed(self, matrix: Matrix) -> Stroke:
         """Return it with each point mapped."""
-        return replace(self, points=tuple(map(matrix, self.points)))
+        return replace(self, points=tuple(matrix(point) for point in self.points))
 
     def part(self, points: Sequence[Point], power: Sequence[float]) -> Stroke:
         """Return a stroke like it, through other points."""
@@ -167,7 +168,7 @@ def checked_power(power: SupportsFloat | Iterable[SupportsFloat], count: int) ->
     if not isinstance(power, Iterable):
         return percent(power)
 
-    powers = tuple(map(percent, cast("Iterable[SupportsFloat]", power)))
+    powers = tuple(map(percent, power))
     if len(powers) != count:
         raise ValueError(f"power has one number for each of the {count} points, or one for all, not {len(powers)}")
 

@@ -7,13 +7,15 @@ is 1/96 inch, as in CSS. The page's lower left corner is the origin of the work 
 from __future__ import annotations
 
 import io
+import math
 from typing import Any
 
 from dobot_async.toolpath import curves
 from dobot_async.toolpath.errors import ToolpathFileError, library
 from dobot_async.toolpath.sources import FINE, Source, check_tolerance, content, name_of
-from dobot_async.toolpath.stroke import Stroke
-from dobot_async.toolpath.svg_tree import Misfit, parse_tree, plain
+from dobot_async.toolpath.stroke import Matrix, Stroke
+from dobot_async.toolpath.svg_checks import Misfit
+from dobot_async.toolpath.svg_tree import parse_tree, plain
 from dobot_async.toolpath.toolpath import Toolpath
 
 __all__ = ["read_svg"]
@@ -44,7 +46,7 @@ def read_svg(source: Source, *, tolerance: float = FINE) -> Toolpath:
     name = name_of(source)
     try:
         text, height = plain(parse_tree(content(source)))
-        found = svgelements.SVG.parse(io.StringIO(text), reify=True, ppi=96)
+        found = svgelements.SVG.parse(io.StringIO(text), reify=False, ppi=96)
         strokes = []
         for shape in found.elements():
             if isinstance(shape, svgelements.Shape) and is_painted(shape):
@@ -73,9 +75,18 @@ def is_painted(shape: Any) -> bool:
 
 
 def outlines(shape: Any, svgelements: Any, tolerance: float) -> list[list[complex]]:
-    """The outlines of a shape as points in px."""
+    """The outlines of a shape as points in px.
+
+    Curves become straight ways before they are transformed: svgelements transforms an arc's half axes, which are no
+    half axes any more once it is skewed.
+    """
+    matrix = shape.transform
+    stretch = math.hypot(matrix.a, matrix.b, matrix.c, matrix.d)
+    if not 0 < stretch < math.inf:
+        return []
+
     found: list[list[complex]] = []
-    for segment in abs(svgelements.Path(shape)):
+    for segment in svgelements.Path(shape.segments(transformed=False)):
         start, end = (None if point is None else complex(point.x, point.y) for point in (segment.start, segment.end))
         if isinstance(segment, svgelements.Move):
             found.append([end] if end is not None else [])
@@ -84,9 +95,10 @@ def outlines(shape: Any, svgelements: Any, tolerance: float) -> list[list[comple
         else:
             if not found[-1] or found[-1][-1] != start:
                 found.append([start])
-            found[-1] += way(segment, svgelements, tolerance)
+            found[-1] += way(segment, svgelements, tolerance / stretch)
 
-    return [points for points in found if len(points) > 1]
+    place = Matrix(matrix.a, matrix.b, matrix.c, matrix.d, float(matrix.e), float(matrix.f))
+    return [[complex(*place((p.real, p.imag))) for p in points] for points in found if len(points) > 1]
 
 
 def way(segment: Any, svgelements: Any, tolerance: float) -> list[complex]:

@@ -11,60 +11,23 @@ from __future__ import annotations
 import logging
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
-__all__ = ["Misfit", "Node", "parse_tree", "plain"]
+from dobot_async.toolpath.svg_checks import SHAPES, Misfit, Node, check, length, numbers_of
+
+__all__ = ["parse_tree", "plain"]
 
 logger = logging.getLogger("dobot_async.toolpath")
 SVG = "http://www.w3.org/2000/svg"
-SHAPES = frozenset({"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"})
+NOT_DRAWN = {"text": "convert it to paths", "image": "read it as a picture", "foreignObject": "convert it to paths"}
 GROUPS = frozenset({"svg", "g", "a", "switch", "use", "symbol"})
-NEVER_DRAWN = frozenset({"defs", "symbol", "clipPath", "mask", "marker", "pattern", "linearGradient", "radialGradient"})
-UNTOLD = frozenset({"title", "desc", "metadata", "filter", "style", "script", *NEVER_DRAWN})
-NOT_DRAWN = {"text": "convert it to paths", "image": "trace it, or read it as a picture", "foreignObject": "leave it out"}
 DEEPEST = 200  # of elements inside of one another, every `use` among them
 MOST = 200_000  # elements once every `use` is written out
-PX = {"": 1.0, "px": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 960 / 25.4, "pt": 96 / 72, "pc": 16.0, "q": 96 / 101.6}
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-LENGTH = re.compile(rf"\s*({NUMBER})\s*(%|[a-zA-Z]*)\s*")
-NUMBERS = re.compile(rf"[\s,]*(?:{NUMBER}[\s,]*)*")
-TRANSFORM = re.compile(
-    rf"\s*(?:(?:matrix|translate|scale|rotate|skewX|skewY)\s*\(\s*(?:{NUMBER}(?:[a-z%]*)[\s,]*)+\)[\s,]*)*"
-)
-DATA = re.compile(rf"\s*([MmZzLlHhVvCcSsQqTtAa])|[\s,]*({NUMBER})|(\s+)$")
-FLAG = re.compile(r"[\s,]*([01])")
-ARGUMENTS = {"m": 2, "z": 0, "l": 2, "h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "t": 2, "a": 7}
 ALONG_X = frozenset({"x", "x1", "x2", "cx", "width", "rx"})
 ALONG_Y = frozenset({"y", "y1", "y2", "cy", "height", "ry"})
-
-
-class Misfit(Exception):
-    """What is wrong, and in which line."""
-
-    def __init__(self, line: int, reason: str) -> None:
-        super().__init__(reason)
-        self.line = line
-        self.reason = reason
-
-
-@dataclass(slots=True)
-class Node:
-    """One element: its name without the namespace, its attributes, what is in it, and its line."""
-
-    tag: str
-    attributes: dict[str, str]
-    line: int
-    children: list[Node] = field(default_factory=list)
-    text: str = ""
-
-    def walk(self) -> Iterator[Node]:
-        """Yield this and all that is in it."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
 
 
 def parse_tree(data: bytes) -> Node:
@@ -91,7 +54,7 @@ def parse_tree(data: bytes) -> Node:
 
     parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, text
     try:
-        parser.Parse(data, True)  # noqa: FBT003 - expat's own
+        parser.Parse(data, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
         raise Misfit(error.lineno, f"this is no XML: {reason} (column {error.offset + 1})") from None
@@ -160,7 +123,9 @@ class Writer:
         check(node)
         if node.tag in SHAPES:
             shape = {name: self._length(node, name, value, view) for name, value in node.attributes.items()}
-            self._parts.append(f"<{node.tag} {attributes(shape | {'data-line': str(node.line), 'data-layer': layer})}/>")
+            self._parts.append(
+                f"<{node.tag} {attributes(shape | {'data-line': str(node.line), 'data-layer': layer})}/>"
+            )
         elif node.tag == "use":
             self._use(node, view, using, layer)
         elif node.tag == "svg":
@@ -275,29 +240,6 @@ def side(root: Node, name: str, default: float) -> float:
     return length(root, name, value, default) if value.strip() != "auto" else default
 
 
-def length(node: Node, name: str, value: str, whole: float) -> float:
-    """A length in user units; raise Misfit for what is none."""
-    match = LENGTH.fullmatch(value)
-    unit = match[2].lower() if match else ""
-    if match and unit == "%":
-        return float(match[1]) / 100 * whole
-
-    if match is None or unit not in PX or not math.isfinite(float(match[1])):
-        raise Misfit(node.line, f"<{node.tag}>: {name}={value!r} is no length (of {', '.join(filter(None, PX))} or %)")
-
-    return float(match[1]) * PX[unit]
-
-
-def numbers_of(node: Node, name: str, count: int) -> list[float]:
-    """So many numbers in an attribute; raise Misfit for others."""
-    value = node.attributes[name]
-    found = [float(number) for number in re.findall(NUMBER, value)]
-    if not NUMBERS.fullmatch(value) or len(found) != count or not all(map(math.isfinite, found)):
-        raise Misfit(node.line, f"<{node.tag}>: {name}={value!r} must be {count} numbers")
-
-    return found
-
-
 def fitted(aspect: str, size: Viewport, corner: tuple[float, float], box: Viewport) -> str:
     """The transform that brings a viewBox into a viewport; SVG 1.1, 7.8."""
     across, down = size.width / box.width, size.height / box.height
@@ -310,71 +252,3 @@ def fitted(aspect: str, size: Viewport, corner: tuple[float, float], box: Viewpo
         y = shares.get(words[0][5:8], 0.5) * (size.height - box.height * down)
 
     return f"translate({x!r} {y!r}) scale({across!r} {down!r}) translate({-corner[0]!r} {-corner[1]!r})"
-
-
-def check(node: Node) -> None:
-    """Raise Misfit for attributes that svgelements would read half of, and say nothing."""
-    for name, checks in CHECKS.items():
-        if name in node.attributes and (name in {"transform"} or node.tag in SHAPES):
-            checks(node, node.attributes[name])
-
-
-def check_transform(node: Node, value: str) -> None:
-    """Known functions with numbers."""
-    if not TRANSFORM.fullmatch(value):
-        raise Misfit(node.line, f"<{node.tag}>: transform={value!r} is not understood")
-
-
-def check_points(node: Node, value: str) -> None:
-    """Pairs of numbers."""
-    count = len(re.findall(NUMBER, value))
-    if not NUMBERS.fullmatch(value) or count % 2:
-        raise Misfit(node.line, f"<{node.tag}>: points must be pairs of numbers, not {shortened(value)}")
-
-
-def check_data(node: Node, value: str) -> None:
-    """Path data: letters, each with a whole number of its arguments."""
-    place, letter, count = 0, "", 0
-
-    def wrong(reason: str) -> Misfit:
-        return Misfit(node.line, f"<path>: {reason} at character {place + 1} of its data, {shortened(value[place:])}")
-
-    while place < len(value):
-        match = (FLAG if letter in "Aa" and letter and count % 7 in {3, 4} else DATA).match(value, place)
-        if match is None:
-            if not value[place:].strip():
-                break
-            raise wrong("something that is no path data")
-
-        word = match[1] if match.re is DATA else None
-        if word and count % max(1, ARGUMENTS.get(letter.lower(), 1)):
-            raise wrong(f"{letter} has too few numbers")
-
-        if word and letter and letter in "MmLlHhVvCcSsQqTtAa" and not count:
-            raise wrong(f"{letter} has no numbers")
-
-        if word:
-            if not letter and word not in "Mm":
-                raise wrong("data that does not begin with M")
-            letter, count = word, 0
-        elif match.re is FLAG or match[2]:
-            if not ARGUMENTS.get(letter.lower(), 0):
-                raise wrong(f"a number where {letter or 'M'} takes none" if letter else "data that does not begin with M")
-            count += 1
-
-        place = match.end()
-
-    if letter and (count % max(1, ARGUMENTS[letter.lower()]) or (ARGUMENTS[letter.lower()] and not count)):
-        raise wrong(f"{letter} has too few numbers")
-
-
-def shortened(text: str) -> str:
-    """What is told of a long text."""
-    return repr(text if len(text) <= 30 else f"{text[:27]}...")
-
-
-CHECKS: Mapping[str, Callable[[Node, str], None]] = {
-    "transform": check_transform,
-    "points": check_points,
-    "d": check_data,
-}
