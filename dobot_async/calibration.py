@@ -25,6 +25,7 @@ from dobot_async._core.util.projective import Pair, Rows, inverse, mapped, solve
 __all__ = ["Calibration"]
 
 TRIES = 500
+ENOUGH = 5  # pairs that fit together by no accident
 KIND = "dobot_async calibration"
 
 
@@ -56,13 +57,13 @@ class Calibration:
         Args:
             pixels: At least three, as (u, v).
             coordinates: Where the arm was for each of them: (x, y) in mm, or poses. More numbers are left out.
-            tolerance: mm by which the map may miss a pair; what misses by more is an outlier. With 4 pairs and fewer
-                nothing can tell one.
+            tolerance: mm by which the map may miss a pair; what misses by more is an outlier. Any four pairs fit
+                together, so that it takes six to tell one.
             seed: Of the random choices, so that the same pairs give the same map.
 
         Raises:
-            ValueError: There are too few pairs, three of three (or nearly all) lie on a line, or fewer than four of
-                more pairs fit together.
+            ValueError: There are too few pairs, three of three (or nearly all) lie on a line, or no five of five
+                or more pairs fit together.
         """
         places = [pair(each, "a pixel") for each in pixels]
         targets = [pair(each, "a coordinate") for each in coordinates]
@@ -78,8 +79,8 @@ class Calibration:
 
         everybody = list(range(len(places)))
         chosen = everybody if len(places) <= 4 else inliers(places, targets, limit, Random(seed))  # noqa: S311
-        if len(chosen) < 4 < len(places):
-            raise ValueError(f"no four of the {len(places)} pairs fit together within {limit:g} mm")
+        if len(chosen) < ENOUGH <= len(places):
+            raise ValueError(f"no {ENOUGH} of the {len(places)} pairs fit together within {limit:g} mm")
 
         matrix = solved([places[i] for i in chosen], [targets[i] for i in chosen])
         if matrix is None:

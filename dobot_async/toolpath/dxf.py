@@ -58,7 +58,9 @@ def read_dxf(source: Source, *, tolerance: float = FINE, unit: float | None = No
 
     if unit is None:
         try:
-            unit = units.conversion_factor(InsertUnits(document.units), InsertUnits.Millimeters) if document.units else 1
+            unit = (
+                units.conversion_factor(InsertUnits(document.units), InsertUnits.Millimeters) if document.units else 1
+            )
         except ValueError:
             raise ToolpathFileError(name, "$INSUNITS", f"{document.units} is no unit; give unit= in mm") from None
     elif not check_duration(unit, "unit"):

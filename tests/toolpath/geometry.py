@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ def samples(lines: Iterable[Line], step: float) -> NDArray[np.float64]:
     found = []
     for line in lines:
         found.append(line[0])
-        for (ax, ay), (bx, by) in zip(line, line[1:], strict=False):
+        for (ax, ay), (bx, by) in pairwise(line):
             count = max(1, int(np.ceil(np.hypot(bx - ax, by - ay) / step)))
             found += [(ax + (bx - ax) * i / count, ay + (by - ay) * i / count) for i in range(1, count + 1)]
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -60,7 +61,7 @@ def halts(records: list[Executed], row: object) -> list[tuple[int, float]]:
     """Where the arm waited for a point: between two commands of one path."""
     return [
         (number, b.started - a.finished)
-        for number, (a, b) in enumerate(zip(records, records[1:], strict=False))
+        for number, (a, b) in enumerate(pairwise(records))
         if a.command is row and b.command is row and b.started != a.finished
     ]
 
