@@ -52,7 +52,7 @@ def read_dxf(source: Source, *, tolerance: float = FINE, unit: float | None = No
     name = name_of(source)
     try:
         document = document_of(content(source), ezdxf)
-    except (DXFError, ValueError, UnicodeError, IndexError, KeyError, AttributeError, TypeError) as error:
+    except (DXFError, ValueError, LookupError, AttributeError, TypeError, OverflowError) as error:
         reason = " ".join((str(error) or type(error).__name__).split())
         raise ToolpathFileError(name, place_of(reason), f"ezdxf cannot read it: {reason}") from None
 
@@ -68,7 +68,7 @@ def read_dxf(source: Source, *, tolerance: float = FINE, unit: float | None = No
 
     strokes: list[Stroke] = []
     unseen = {layer.dxf.name.lower() for layer in document.layers if not is_plotted(layer)} | {"defpoints"}
-    for entity in disassemble.recursive_decompose(document.modelspace()):
+    for entity in entities_of(document, disassemble, name):
         layer = entity.dxf.get("layer", "0")
         if entity.dxf.get("invisible", 0) or layer.lower() in unseen:
             continue
@@ -83,6 +83,14 @@ def read_dxf(source: Source, *, tolerance: float = FINE, unit: float | None = No
             raise ToolpathFileError(name, place, str(error) or type(error).__name__) from None
 
     return Toolpath(tuple(strokes))
+
+
+def entities_of(document: Any, disassemble: Any, name: str) -> list[Any]:
+    """All entities of the model space, those of blocks among them."""
+    try:
+        return list(disassemble.recursive_decompose(document.modelspace()))
+    except (ValueError, LookupError, AttributeError, TypeError, OverflowError, RecursionError) as error:
+        raise ToolpathFileError(name, "model space", f"ezdxf cannot read it: {error!r}") from None
 
 
 def place_of(reason: str) -> str:

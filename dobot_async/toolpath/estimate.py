@@ -23,6 +23,7 @@ from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.programs import CobotProgram, MagicianProgram, Pace, Program, UltraArmProgram
 from dobot_async.toolpath.schedule import RATE, TOLERANCE, planned
 from dobot_async.toolpath.toolpath import Toolpath
+from dobot_async.ultraarm import commands as u
 from dobot_async.ultraarm import frame as ultraarm_frame
 from dobot_async.ultraarm.arm import UltraArm
 from dobot_async.wire import Command
@@ -30,6 +31,7 @@ from dobot_async.wire import Command
 __all__ = ["Estimate", "estimate"]
 
 ROOM = 1_000_000
+HOMING = 1e3  # seconds in which an arm is at home
 END = 1e9  # seconds; by then every drawing is done
 
 
@@ -48,6 +50,20 @@ class Estimate:
     drawn: float
     travel: float
     stroke_ends: tuple[float, ...]
+
+
+class Clock:
+    """The time of a simulation, which is set.
+
+    Attributes:
+        now: Seconds.
+    """
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
 
 
 class Bench:
@@ -104,21 +120,22 @@ def estimate(
         ValueError: The simulated arm cannot draw it: it tells the stroke.
         TypeError: There is no simulator for this.
     """
-    now = 0.0
+    clock = Clock()
     path = toolpath.simplify(tolerance)
     strokes = planned(path, plane, tool, speed, rate) if path.strokes else []
     moves = [move for some in strokes for move in some]
     if not moves:
         return Estimate(0.0, 0.0, 0.0, ())
 
-    bench = bench_of(arm, lambda: now, tool, Pace(acceleration, percent), moves[0].place)
+    bench = bench_of(arm, clock, tool, Pace(acceleration, percent), moves[0].place)
 
     instructions = list(bench.program.instructions(approach(bench.here, moves, plane) + moves))
+    begun, before = clock.now, len(bench.arm.executed)
     for each in instructions:
         bench.put(each.row, each.value)
 
-    now = END
-    done = [record for record in bench.arm.executed if record.index is not None]
+    clock.now = END
+    done = bench.arm.executed[before:]
     ends: dict[int, float] = {}
     for each, record in zip(instructions, done, strict=False):
         stroke = each.move.stroke if each.move else None
@@ -126,15 +143,15 @@ def estimate(
             raise ValueError(f"stroke {stroke} cannot be drawn by the simulated arm")
 
         if each.move and each.move.kind in {Kind.DRAW, Kind.LIFT}:
-            ends[each.move.stroke] = record.finished
+            ends[each.move.stroke] = record.finished - begun
 
     if len(done) < len(instructions):
         raise ValueError(f"stroke {len(ends)} cannot be drawn by the simulated arm")
 
-    return Estimate(done[-1].finished, path.length, path.travel, tuple(ends.values()))
+    return Estimate(done[-1].finished - begun, path.length, path.travel, tuple(ends.values()))
 
 
-def magician(kinematics: Kinematics, clock: Callable[[], float], tool: Tool, pace: Pace) -> Bench:
+def magician(kinematics: Kinematics, clock: Clock, tool: Tool, pace: Pace) -> Bench:
     """A Magician with its tool, at home."""
     arm = SimulatedMagician(clock, replace(MAGICIAN, capacity=ROOM, keep=None), limits=kinematics.limits)
     bias = m.EndEffectorParams(kinematics.x_bias, kinematics.y_bias, kinematics.z_bias)
@@ -144,19 +161,20 @@ def magician(kinematics: Kinematics, clock: Callable[[], float], tool: Tool, pac
     return Bench(arm, lambda row, data: bytes(magician_frame.request(row, data, queued=True)), place_of(pose), program)
 
 
-def ultraarm(clock: Callable[[], float], tool: Tool) -> Bench:
-    """An ultraArm at home."""
+def ultraarm(clock: Clock, tool: Tool) -> Bench:
+    """An ultraArm that has been at home."""
     arm = SimulatedUltraArm(clock, replace(ULTRAARM, capacity=ROOM, keep=None))
+
+    def encode(row: Command[Any, Any], data: bytes) -> bytes:
+        return bytes(ultraarm_frame.encode(row, data, queued=True))
+
+    arm.session().receive(encode(u.HOME, u.HOME.request.encode(None)))
+    clock.now += HOMING
     here = place_of(arm.pose)
-    return Bench(
-        arm,
-        lambda row, data: bytes(ultraarm_frame.encode(row, data, queued=True)),
-        here,
-        UltraArmProgram(tool, here),
-    )
+    return Bench(arm, encode, here, UltraArmProgram(tool, here))
 
 
-def cobot(model: CobotModel, clock: Callable[[], float], pace: Pace, first: Place) -> Bench:
+def cobot(model: CobotModel, clock: Clock, pace: Pace, first: Place) -> Bench:
     """A myCobot that stands above the first stroke, with a hand that looks down."""
     arm = SimulatedMyCobot(clock, replace(MYCOBOT, capacity=ROOM, keep=None), model=model.name)
     rotation = (180.0, 0.0, 0.0) if len(model.reach) == 6 else (0.0,)
@@ -180,7 +198,7 @@ def place_of(pose: Any) -> Place:
     return pose.x, pose.y, pose.z
 
 
-def bench_of(arm: Any, clock: Callable[[], float], tool: Tool, pace: Pace, first: Place) -> Bench:
+def bench_of(arm: Any, clock: Clock, tool: Tool, pace: Pace, first: Place) -> Bench:
     """A simulated arm like another one."""
     if isinstance(arm, (Magician, Kinematics)) or arm == "magician":
         return magician(

@@ -59,6 +59,9 @@ def parse_tree(data: bytes) -> Node:
         reason = expat.ErrorString(error.code)
         raise Misfit(error.lineno, f"this is no XML: {reason} (column {error.offset + 1})") from None
 
+    except (LookupError, ValueError) as error:
+        raise Misfit(1, f"its encoding is not known: {error}") from None
+
     root = stack[0].children[0]
     if root.tag != "svg":
         raise Misfit(root.line, f"this is no SVG: its root is <{root.tag.removeprefix('other-')}>")

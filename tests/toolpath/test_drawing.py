@@ -44,6 +44,7 @@ from dobot_async.toolpath import (
     read_svg,
     write_text,
 )
+from dobot_async.toolpath.programs import STRAIGHT
 from dobot_async.ultraarm import commands as u
 
 PAPER = WorkPlane.flat(195, -45, -50, lift=6)
@@ -424,7 +425,7 @@ async def test_an_ultraarm_engraves_and_its_laser_is_off_on_every_way_out() -> N
         duties = [each.value.duty for each in sim.arm.executed if each.command is u.SET_PWM]
         assert duties == [0, 127, 0, 127, 0, 127, 0]
         names = [each.name for each in sim.arm.executed]
-        assert names.index("M3") < names.index("G0", 1) < len(names) - 1 - names[::-1].index("M5")
+        assert names.index("M3") < names.index(STRAIGHT.name, 1) < len(names) - 1 - names[::-1].index("M5")
         assert not sim.arm.registers.laser
 
         task = asyncio.create_task(engrave(arm, TWO, plane))

@@ -72,7 +72,7 @@ CORNERS = [(200, 0, -10), (200, 90, -10), (260, 0, -4)]
 def test_a_grid_is_a_sequence_of_its_places() -> None:
     grid = Grid(CORNERS, rows=3, columns=4, layers=2, layer_height=20)
     assert len(grid) == 24
-    assert grid[0] == (200, 0, -10)
+    assert tuple(grid[0]) == pytest.approx((200, 0, -10))
     assert grid[3] == pytest.approx((200, 90, -10))
     assert grid[11] == pytest.approx((260, 90, -4))
     assert grid[-1] == pytest.approx((260, 90, 16))
@@ -118,9 +118,13 @@ def test_grids_that_are_none_are_refused(make: Any) -> None:
 
 def test_places_beyond_the_grid_are_index_errors() -> None:
     grid = Grid(CORNERS, 2, 2)
-    for get in (lambda: grid[4], lambda: grid[-5], lambda: grid.at(2, 0), lambda: grid.at(0, -1)):
+    for number in (4, -5):
         with pytest.raises(IndexError):
-            get()
+            grid[number]
+
+    for row, column in ((2, 0), (0, -1)):
+        with pytest.raises(IndexError):
+            grid.at(row, column)
 
     with pytest.raises(TypeError, match="whole"):
         Grid(CORNERS, 2.0, 2)  # type: ignore[arg-type]
@@ -207,9 +211,8 @@ def test_pairs_that_say_nothing_are_refused(seen: Any, targets: Any, reason: str
 
 
 def test_beyond_the_horizon_is_no_place() -> None:
-    table = lambda u, v: (u / (1 + v / 1000), v / (1 + v / 1000))  # noqa: E731
     seen = [(0, 0), (500, 0), (0, 500), (500, 500), (200, 300)]
-    found = Calibration.from_points(seen, [table(*pixel) for pixel in seen])
+    found = Calibration.from_points(seen, [(u / (1 + v / 1000), v / (1 + v / 1000)) for u, v in seen])
     with pytest.raises(ValueError, match="horizon"):
         found.to_arm((0, -1200))
 

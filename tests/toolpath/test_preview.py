@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import cast
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -69,7 +70,7 @@ def test_png_shows_what_svg_shows() -> None:
     assert shown.size == (500, 250 + 34)
 
     def at(x: float, y: float) -> tuple[int, int, int]:
-        return shown.getpixel(((x + 10) * 5, (40 - y) * 5))  # type: ignore[return-value]
+        return cast("tuple[int, int, int]", shown.getpixel((round((x + 10) * 5), round((40 - y) * 5))))
 
     assert at(80, 15)[0] > 180
     assert at(80, 15)[1] < 120

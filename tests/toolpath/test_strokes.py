@@ -111,7 +111,7 @@ def test_transforms_have_inverses(path: Toolpath, by: Point, degrees: float, abo
     assert near(path.rotate(degrees, about=about).rotate(-degrees, about=about), path)
     assert near(path.scale(factor, about=about).scale(1 / factor, about=about), path)
     for axis in ("x", "y"):
-        assert near(path.mirror(axis, about=about).mirror(axis, about=about), path)  # type: ignore[arg-type]
+        assert near(path.mirror(axis, about=about).mirror(axis, about=about), path)
 
 
 @given(toolpaths, st.floats(-720, 720), st.floats(0.1, 10))
