@@ -129,6 +129,7 @@ class Drawing:
         self._progress = progress
         self._running: asyncio.Task[Any] | None = None
         self._stopped = False
+        self._epoch: Any = None
         self._began = 0.0
         self._taken = (0.0, 0.0)  # seconds that what is done has taken, and was guessed to take
         self.next_stroke = 0
@@ -164,6 +165,7 @@ class Drawing:
             return
 
         self._running, self._stopped, self._taken = asyncio.current_task(), False, (0.0, 0.0)
+        self._epoch = getattr(self._arm.queue, "epoch", None)  # which a stop by anybody ends, where the queue has one
         try:
             here, program = await program_for(self._arm, self._tool, self._pace)
             moves = self._moves(here)
@@ -211,9 +213,7 @@ class Drawing:
         """Put commands in batches; note the last one of each stroke."""
         motions: list[Motion] = []
         for some in batches(instructions):
-            if self._stopped:
-                raise MotionStopped("the drawing was stopped")
-
+            self._check_stop()
             async with self._arm.queue.batch() as batch:
                 motions = [batch.put(each.row, each.value) for each, _ in some]
 
@@ -226,6 +226,14 @@ class Drawing:
                 raise another(failure)
 
         pending.append((motions[-1], len(self._strokes) - 1))
+
+    def _check_stop(self) -> None:
+        """Raise MotionStopped if a stop came since `run` began: nothing is awaited between this and the next batch."""
+        if self._stopped:
+            raise MotionStopped("the drawing was stopped")
+
+        if self._epoch:
+            self._epoch.check()
 
     async def _watch(self, pending: deque[tuple[Motion, int]]) -> None:
         """Ask now and then how far the arm is: no more often, for each question takes the line for a while."""

@@ -101,7 +101,7 @@ def estimate(
     percent: int = 20,
     rate: SupportsFloat | None = RATE,
 ) -> Estimate:
-    """Return how long a drawing takes, by drawing it with a simulated arm. It takes a second for some 10,000 points.
+    """Return how long a drawing takes, by drawing it with a simulated arm. It takes two seconds for 10,000 points.
 
     The arm is taken to have its usual speeds for moves above the paper (`PTPCommonParams` 50 % of a Magician).
 
