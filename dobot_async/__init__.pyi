@@ -2,6 +2,8 @@
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.queue.motion import Motion
+from dobot_async.arms.base import Arm
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.contract import LinkState, LinkStats, Unexpected
 from dobot_async.discovery import DiscoveryProblem, Found, discover
 from dobot_async.errors import (
@@ -18,10 +20,13 @@ from dobot_async.errors import (
 )
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.magician.alarms import Alarm
-from dobot_async.magician.arm import DeviceInfo, Jog, Magician
+from dobot_async.magician.arm import Magician
 from dobot_async.magician.effectors import Gripper, Laser, Pen, SuctionCup
+from dobot_async.magician.jogs import Jog
 from dobot_async.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.magician.params import (
+    AccessoryVersion,
+    Color,
     ColorPort,
     EndEffectorParams,
     HHTTrigMode,
@@ -35,19 +40,23 @@ from dobot_async.mycobot.alarms import CobotAlarm
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.models import CobotModel
 from dobot_async.mycobot.params import Coords, EndType, GripperType, MoveMode, PinMode, ReferenceFrame
-from dobot_async.mycobot.readings import CobotInfo, CobotPose
+from dobot_async.mycobot.pose import CobotPose
+from dobot_async.mycobot.readings import CobotInfo
 from dobot_async.transports import open_transport
 from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
-from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits
+from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits, UltraArmPose
 from dobot_async.wire import Command
 
 __all__ = [
+    "AccessoryVersion",
     "Alarm",
+    "Arm",
     "ArmAlarm",
     "CobotAlarm",
     "CobotInfo",
     "CobotModel",
     "CobotPose",
+    "Color",
     "ColorPort",
     "Command",
     "CommandRejected",
@@ -93,6 +102,7 @@ __all__ = [
     "UltraArmCoords",
     "UltraArmJog",
     "UltraArmLimits",
+    "UltraArmPose",
     "Unexpected",
     "Unreachable",
     "UnsupportedError",

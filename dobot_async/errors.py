@@ -38,7 +38,14 @@ E = TypeVar("E", bound=BaseException)
 
 
 class DobotError(Exception):
-    """The root of everything that an arm or its link can do wrong."""
+    """The root of everything that an arm or its link can do wrong.
+
+    Attributes:
+        steps: Of `queue.stream`: the first and the last step that may have failed, both the same where it is known
+            which; () for everything else.
+    """
+
+    steps: tuple[Any, ...] = ()
 
 
 class ConnectFailed(DobotError, ConnectionError):
@@ -66,11 +73,14 @@ class ArmAlarm(DobotError):
 
     Attributes:
         alarms: What is set, each with its code, cause and remedy.
+        motions: Of a queue, in order: the first motion that is not known to be done, up to the last that may have
+            failed.
     """
 
-    def __init__(self, message: str, alarms: Sequence[Any] = ()) -> None:
+    def __init__(self, message: str, alarms: Sequence[Any] = (), motions: Sequence[Any] = ()) -> None:
         super().__init__(message)
         self.alarms = tuple(alarms)
+        self.motions = tuple(motions)
 
 
 class MotionStopped(DobotError):

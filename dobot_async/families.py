@@ -35,19 +35,23 @@ class Family:
         models: Its words beside its name: models that are chosen as an arm is.
         public: The names that it adds to the package, by the modules that they are in.
         simulator: Makes a simulated arm, from a clock.
+        scene: A `dobot_async.simulator.scene.SceneArm`, from a simulated arm.
         bridge: A `dobot_async.bridged.Bridged`.
         discovery: A `dobot_async.discovery.families.Family`.
         cli: A `dobot_async.cli.family.Family`.
         fleet: A `dobot_async.fleet.families.Family`.
+        program: A `dobot_async.program.Vocabulary`.
     """
 
     models: tuple[str, ...] = ()
     public: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     simulator: str = ""
+    scene: str = ""
     bridge: str = ""
     discovery: str = ""
     cli: str = ""
     fleet: str = ""
+    program: str = ""
 
 
 class Parts(Mapping[str, T], Generic[T]):

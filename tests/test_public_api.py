@@ -12,12 +12,15 @@ import pytest
 import dobot_async
 
 NAMES = [
+    "AccessoryVersion",
     "Alarm",
+    "Arm",
     "ArmAlarm",
     "CobotAlarm",
     "CobotInfo",
     "CobotModel",
     "CobotPose",
+    "Color",
     "ColorPort",
     "Command",
     "CommandRejected",
@@ -63,6 +66,7 @@ NAMES = [
     "UltraArmCoords",
     "UltraArmJog",
     "UltraArmLimits",
+    "UltraArmPose",
     "Unexpected",
     "Unreachable",
     "UnsupportedError",

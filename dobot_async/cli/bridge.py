@@ -7,10 +7,12 @@ from typing import Any
 
 import click
 
+from dobot_async.cli.addresses import connectable
 from dobot_async.cli.session import Session, run
 
 __all__ = ["FILE", "GROUPS", "bridge", "serve"]
 
+LONGEST_TOKEN = 4096
 GROUPS = ("wifi", "calibration", "firmware")
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -45,6 +47,7 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
     port 0 takes a free one. The first lines of the output are the URLs to connect to, and the token if one had to be
     made up: any address but this computer's own needs one. After them comes a line for whatever happens.
     """
+    session.refuse("SOURCE_URL says where the arm is", "url")
     if session.trace:
         raise click.UsageError("a bridge writes no trace: passwords go through it; trace the program that connects")
 
@@ -56,8 +59,10 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
 
 def token_in(file: Path) -> str:
     """Returns the token in a file; raises UsageError if there is none."""
-    token = file.read_bytes().strip()
-    if not token.isascii() or not token:
+    with file.open("rb") as opened:
+        token = opened.read(LONGEST_TOKEN + 1).strip()
+
+    if not token.isascii() or not 1 <= len(token) <= LONGEST_TOKEN:
         raise click.UsageError(f"{file} has no token: one word of printable ASCII characters")
 
     return token.decode("ascii")
@@ -68,8 +73,9 @@ async def serve(session: Session, *, source: str, token: str | None, **details: 
     from dobot_async.bridge import bridge as bridged
 
     async with bridged(source, token=token, family=session.arm, **details) as running:
-        answer: dict[str, Any] = {"urls": running.urls}
-        text = "\n".join(running.urls)
+        urls = [connectable(url) for url in running.urls]
+        answer: dict[str, Any] = {"urls": urls}
+        text = "\n".join(urls)
         if running.token != token:
             answer["token"] = running.token
             text += f"\ntoken {running.token}"
@@ -77,4 +83,4 @@ async def serve(session: Session, *, source: str, token: str | None, **details: 
         events = aiter(running.events)
         session.output.answer(answer, text)
         async for event in events:
-            session.output.say(str(event))
+            session.output.answer(event, str(event))

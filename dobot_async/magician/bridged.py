@@ -15,8 +15,9 @@ from dobot_async.errors import ProtocolError
 from dobot_async.magician import alarms
 from dobot_async.magician import commands as c
 from dobot_async.magician import frame as f
-from dobot_async.magician.arm import BARRIERS, LEAVING
+from dobot_async.magician.arm import BARRIERS
 from dobot_async.magician.frame import Frame
+from dobot_async.magician.stopping import LEAVING, TOOLS
 from dobot_async.transports import Transport
 from dobot_async.wire import Command, Number, Queueing, u64
 
@@ -28,6 +29,7 @@ ACKNOWLEDGED = 1.0  # seconds within which the arm acknowledges a queued command
 PATIENCE = 1.5
 LITE_READS = {7, 33, 68, 69, 215}  # of the Magician Lite; they are in no public manual
 STOPS = {c.SET_QUEUED_CMD_STOP_EXEC.id, c.SET_QUEUED_CMD_FORCE_STOP_EXEC.id}
+TOOLS_OFF = {(row.id, row.request.encode(value)) for row, value in TOOLS}
 IDLE = c.SET_JOG_CMD.request.encode(c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE))[1:]
 MOTORS = {c.SET_E_MOTOR.id, c.SET_E_MOTOR_S.id}
 
@@ -135,9 +137,9 @@ class BridgedMagician(ByKey[Frame]):
 
     def kind(self, request: Frame) -> Kind:
         """Returns what a request is."""
-        if request.id in STOPS or (
-            request.id == c.SET_JOG_CMD.id and request.write and not request.queued and request.params[1:] == IDLE
-        ):
+        now = request.write and not request.queued
+        ends_jog = request.id == c.SET_JOG_CMD.id and request.params[1:] == IDLE
+        if request.id in STOPS or (now and (ends_jog or (request.id, request.params) in TOOLS_OFF)):
             return Kind.STOP
 
         known = (request.id, False) in c.BY_KEY or request.id in LITE_READS

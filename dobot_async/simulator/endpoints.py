@@ -9,14 +9,15 @@ calls, and the arm answers.
 from __future__ import annotations
 
 import asyncio
+import inspect
 import itertools
 import math
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
 from functools import partial
 from random import Random
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, overload
 from urllib.parse import SplitResult, urlsplit
 from weakref import WeakValueDictionary
 
@@ -25,24 +26,43 @@ import anyio
 from dobot_async.errors import ConnectFailed
 from dobot_async.families import Parts
 from dobot_async.simulator.faults import MEANS, PROBABILITIES, TIMES, Channel, Faults, LineState
-from dobot_async.transports.base import MANY, Transport, options
+from dobot_async.simulator.scene import Mount, Scene
+from dobot_async.transports.base import MANY, Option, Transport, options
 from dobot_async.transports.baud import AtBaud
 from dobot_async.transports.listen import on_tcp, on_udp
 from dobot_async.transports.terminal import on_pty
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    from dobot_async.simulator.magician import SimulatedMagician
+    from dobot_async.simulator.mycobot import SimulatedMyCobot
+    from dobot_async.simulator.ultraarm import SimulatedUltraArm
+
+    A = TypeVar("A", default=Any)
+else:
+    from typing import TypeVar
+
+    A = TypeVar("A")
+
 __all__ = ["MODELS", "Simulation", "open_url", "simulate"]
+
+MyCobotModel = Literal[
+    "mycobot", "myarm300", "mycobot280", "mycobot280pi", "mycobot320", "mecharm270", "mypalletizer260"
+]
 
 MODELS: Parts[Callable[..., Any]] = Parts("simulator")
 """The simulated arms by name: each is made with a clock, and has a `session()` for each client."""
 BLE_OPTIONS = {"name": str, "address": str, "interval": float, "mtu": int, "packets": int}
 PTY_OPTIONS = {"baud": int}
 FAULT_OPTIONS = dict.fromkeys((*PROBABILITIES, *TIMES, *MEANS), float)
+HOMING = {"homed": Option(lambda text: bool(("false", "true").index(text)), "true or false")}
 SILENCE = 1.0  # seconds after which a client that cannot be seen to leave counts as another one
 BUFFER = 1 << 16
 LEAST_REORDER_WINDOW = 0.005
 
 names = itertools.count(1)
-running: WeakValueDictionary[str, Simulation] = WeakValueDictionary()
+running: WeakValueDictionary[str, Simulation[Any]] = WeakValueDictionary()
 """The simulations of this process, by the host of their `sim://` URLs."""
 
 
@@ -65,8 +85,8 @@ class Lapse:
         return (self._now() - self._started) * self.speed
 
 
-class Simulation:
-    """A simulated arm that can be reached.
+class Simulation(Generic[A]):
+    """A simulated arm that can be reached; A is its class, such as SimulatedMagician.
 
     Attributes:
         url: What to connect to.
@@ -76,16 +96,25 @@ class Simulation:
         outages: When a stall or a silence that was drawn began on a line, and when it ends, in the loop's seconds.
     """
 
-    def __init__(self, arm: Any, faults: Faults, seed: int | None) -> None:
+    def __init__(self, arm: A, faults: Faults, seed: int | None, scene: Scene | None = None) -> None:
         self.url = ""
         self.arm = arm
         self.faults = faults
         self.environment: dict[str, str] = {}
         self.outages: list[tuple[float, float]] = []
+        self._scene = scene
         self._random = Random(seed)  # noqa: S311 - repeatable faults, no secrets
         self._clients: dict[Client, None] = {}
         self._departed: list[Client] = []
         self._ended = False
+
+    @property
+    def scene(self) -> Scene:
+        """What the arm stands in; raises RuntimeError if it was simulated without one."""
+        if self._scene is None:
+            raise RuntimeError("this arm stands in no scene: simulate(..., scene=Scene(...)) gives it one")
+
+        return self._scene
 
     def client(
         self,
@@ -97,8 +126,9 @@ class Simulation:
         name: str = "",  # noqa: ARG002 - an arm tells of nobody
     ) -> Client:
         """Called by an endpoint: somebody has connected, and takes replies by `deliver`."""
+        arm: Any = self.arm
         client = Client(
-            self.arm.session,
+            arm.session,
             self.faults,
             self._random,
             deliver,
@@ -211,6 +241,60 @@ class Client:
             self._back.send(replies)
 
 
+@overload
+def simulate(
+    model: Literal["magician"] = "magician",
+    *,
+    listen: str = ...,
+    speed: float = ...,
+    seed: int | None = ...,
+    faults: Faults | None = ...,
+    clock: Callable[[], float] | None = ...,
+    scene: Scene | None = ...,
+    mount: Mount | None = ...,
+    **details: Any,
+) -> AbstractAsyncContextManager[Simulation[SimulatedMagician]]: ...
+@overload
+def simulate(
+    model: MyCobotModel,
+    *,
+    listen: str = ...,
+    speed: float = ...,
+    seed: int | None = ...,
+    faults: Faults | None = ...,
+    clock: Callable[[], float] | None = ...,
+    scene: Scene | None = ...,
+    mount: Mount | None = ...,
+    **details: Any,
+) -> AbstractAsyncContextManager[Simulation[SimulatedMyCobot]]: ...
+@overload
+def simulate(
+    model: Literal["ultraarm"],
+    *,
+    listen: str = ...,
+    speed: float = ...,
+    seed: int | None = ...,
+    faults: Faults | None = ...,
+    clock: Callable[[], float] | None = ...,
+    scene: Scene | None = ...,
+    mount: Mount | None = ...,
+    **details: Any,
+) -> AbstractAsyncContextManager[Simulation[SimulatedUltraArm]]: ...
+@overload
+def simulate(
+    model: str,
+    *,
+    listen: str = ...,
+    speed: float = ...,
+    seed: int | None = ...,
+    faults: Faults | None = ...,
+    clock: Callable[[], float] | None = ...,
+    scene: Scene | None = ...,
+    mount: Mount | None = ...,
+    **details: Any,
+) -> AbstractAsyncContextManager[Simulation[Any]]: ...
+
+
 @asynccontextmanager
 async def simulate(
     model: str = "magician",
@@ -220,8 +304,10 @@ async def simulate(
     seed: int | None = None,
     faults: Faults | None = None,
     clock: Callable[[], float] | None = None,
+    scene: Scene | None = None,
+    mount: Mount | None = None,
     **details: Any,
-) -> AsyncIterator[Simulation]:
+) -> AsyncIterator[Simulation[Any]]:
     """Runs a simulated arm for the length of a block.
 
     Args:
@@ -233,10 +319,12 @@ async def simulate(
         seed: Of the faults.
         faults: What the line does to messages.
         clock: Simulated seconds; by default the event loop's own time, times `speed`.
-        details: What else the model takes: `options`, `quirks`.
+        scene: What the arm works in, alone or with others: pieces, belts, sensors, what it can run into.
+        mount: How it stands there, and its tool; by default at the origin, with a suction cup.
+        details: What else the model takes: `options`, `quirks`; a Magician also `limits` and `homed`.
 
     Raises:
-        ValueError: No such model, or no such place to listen at.
+        ValueError: No such model, no such place to listen at, or the scene has no room for the arm.
         OSError: The place is taken, or dbus-daemon, which BLE needs, is not installed.
     """
     if model not in MODELS:
@@ -246,9 +334,18 @@ async def simulate(
         raise ValueError(f"speed must be above 0 and finite, not {speed!r}")
 
     serve = endpoint(listen)
-    arm = MODELS[model](clock or Lapse(speed), **details)
-    simulation = Simulation(arm, faults or Faults(), seed)
+    clock = clock or Lapse(speed)
+    if scene is not None:
+        clock = scene.share_clock(clock, speed)
+    elif mount is not None:
+        raise ValueError("mount says how the arm stands in a scene: give scene= as well")
+
+    arm = MODELS[model](clock, **details)
+    simulation = Simulation(arm, faults or Faults(), seed, scene)
     async with AsyncExitStack() as stack:
+        if scene is not None:
+            stack.callback(scene.attach(model, arm, mount or Mount()))
+
         simulation.url = await serve(simulation, stack)
         stack.callback(simulation.end)
         yield simulation
@@ -382,7 +479,11 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:
 
         return MemoryTransport(simulation)
 
-    given = options(url, {"speed": float, "seed": int, **FAULT_OPTIONS})
+    homing = "homed" in inspect.signature(MODELS[arm]).parameters if arm in MODELS else False
+    given = options(url, {"speed": float, "seed": int, **FAULT_OPTIONS, **(HOMING if homing else {})})
+    if homing:
+        given.setdefault("homed", True)  # for first steps; `simulate()` makes an arm as it is after power-up
+
     faults = Faults(**{name: given.pop(name) for name in FAULT_OPTIONS if name in given})
     async with AsyncExitStack() as stack:
         simulation = await stack.enter_async_context(simulate(arm, faults=faults, **given))

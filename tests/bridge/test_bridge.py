@@ -110,6 +110,7 @@ async def test_who_asks_is_answered_and_nobody_else() -> None:
     """Two programs read the same registers of the same addresses, pipelined; the answers are in their own order."""
     async with bridged() as rig, client(rig.url) as one, client(rig.url) as other:
         for address in range(1, 21):
+            rig.sim.arm.state.set(c.SET_IO_MULTIPLEXING, c.IOMultiplexing(address, c.IOFunction.ADC))
             rig.sim.arm.set_adc(address, 100 * address)
 
         async def read(plain: Plain, addresses: list[int]) -> None:

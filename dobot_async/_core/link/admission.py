@@ -54,6 +54,9 @@ class Admission:
 
     async def acquire(self, key: Hashable, priority: Priority) -> None:
         """Return when a request is admitted."""
+        if self.try_acquire(key, priority):
+            return
+
         self._number += 1
         waiting = Waiting(priority, self._number, key, asyncio.get_running_loop().create_future())
         insort(self._waiting, waiting)

@@ -104,6 +104,7 @@ class Correlator(Generic[F]):
         self._numbers = count()
         self._outstanding: list[Request[F]] = []  # in the order in which they were sent
         self._heard_at: dict[Hashable, float] = {}
+        self._expires_at = math.inf  # when the first of those is gone that turned out to be lost
 
     @property
     def reorder_window(self) -> float:
@@ -155,10 +156,10 @@ class Correlator(Generic[F]):
 
     def expire(self) -> None:
         """End what turned out, a reorder window ago, to have been lost."""
-        if self.reorder_window:
-            now = self._clock()
+        if self._expires_at < math.inf and (now := self._clock()) >= self._expires_at:
             gone = [request for request in self._outstanding if request.gone_at <= now]
             self._outstanding = [request for request in self._outstanding if request.gone_at > now]
+            self._expires_at = min((request.gone_at for request in self._outstanding), default=math.inf)
             self._lose(gone)
 
     def fail(self, error: Exception) -> None:
@@ -170,12 +171,13 @@ class Correlator(Generic[F]):
     def _answered(self, place: int, value: Any) -> None:
         """Apply rule 2, and give the request at a place its reply."""
         request, earlier = self._outstanding[place], self._outstanding[:place]
-        if self.reorder_window:
+        if window := self.reorder_window:
             now = self._heard_at[request.key] = self._clock()
             del self._outstanding[place]
             for other in earlier:
-                if other.sent_at <= request.sent_at - self.reorder_window:
-                    other.gone_at = min(other.gone_at, now + self.reorder_window)
+                if other.sent_at <= request.sent_at - window:
+                    other.gone_at = min(other.gone_at, now + window)
+                    self._expires_at = min(self._expires_at, other.gone_at)
         elif request.held is None:  # what is held may have come alone, and proves nothing
             del self._outstanding[: place + 1]
             self._lose(earlier)

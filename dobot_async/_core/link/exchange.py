@@ -19,6 +19,7 @@ from typing import Any, Generic, TypeVar
 
 from dobot_async._core.link.connection import Connection, Reopen
 from dobot_async._core.link.correlator import Correlator, Outcome, Request
+from dobot_async._core.link.deadlines import Deadlines, release
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.link.silence import Silence
 from dobot_async._core.link.stragglers import Stragglers
@@ -66,6 +67,7 @@ class Exchange(Connection, Generic[F]):
         self._filler = filler
         self._silence = Silence(self.url, self._loop.time)
         self._losses = 0  # that the log has not told yet
+        self._deadlines = Deadlines()
 
     @property
     def reply_timeout(self) -> float:
@@ -138,14 +140,16 @@ class Exchange(Connection, Generic[F]):
         request: Request[F] | None = None
         with suppress(ReplyTimeout):
             while True:
-                await self._clear(frame.key, deadline)
+                if self._correlator.newest(frame.key):
+                    await self._clear(frame.key, deadline)
+
                 left = self._left(deadline)
                 if not left:
                     break
 
                 ready()
                 self._stats.repeated += request is not None
-                held = not self._correlator.reorder_window and self._stragglers.suspected(frame.key, self._loop.time())
+                held = self._stragglers.suspected(frame.key, self._loop.time()) and not self._correlator.reorder_window
                 request = await self.send(frame, accept, timeout=left, held=held)
                 if held:
                     await self._send_barrier(frame.key, deadline)
@@ -235,25 +239,29 @@ class Exchange(Connection, Generic[F]):
 
     async def _wait(self, until: float, *requests: Request[F]) -> None:
         """Return when one of several requests has ended, or at a time."""
-        if any(request.outcome for request in requests):
-            return
+        for request in requests:
+            if request.outcome:
+                return
 
-        ended: asyncio.Future[None] = self._loop.create_future()
+        ended = self._loop.create_future()
         wake = partial(release, ended)
-        timer = self._loop.call_at(until, wake)
+        self._deadlines.add(ended, until)
         for request in requests:
             request.wakers.append(wake)
 
         try:
             await ended
         finally:
-            timer.cancel()
+            self._deadlines.remove(ended)
             for request in requests:
                 if request.outcome is None:
                     request.wakers.remove(wake)
 
-        if not any(request.outcome for request in requests):
-            self._resync()
+        for request in requests:
+            if request.outcome:
+                return
+
+        self._resync()
 
     def _left(self, deadline: float) -> float:
         """The seconds until a deadline, 0 if it is over; the loop's timers may fire a moment early."""
@@ -305,12 +313,6 @@ class Exchange(Connection, Generic[F]):
     def _resync(self) -> None:
         """Give up a frame the rest of which is overdue."""
         raise NotImplementedError
-
-
-def release(ended: asyncio.Future[None]) -> None:
-    """End a waiting that may have ended already."""
-    if not ended.done():
-        ended.set_result(None)
 
 
 def ignore(_: object) -> None:

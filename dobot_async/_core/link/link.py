@@ -165,11 +165,17 @@ class Link(Exchange[F]):
 
         self._check()
         deadline = self._loop.time() + timeout
-        async with self._admitted(frame.key, Priority.URGENT if urgent else Priority.IMMEDIATE, deadline, name):
+        priority = Priority.URGENT if urgent else Priority.IMMEDIATE
+        if not self._admission.try_acquire(frame.key, priority):
+            await self._acquire(frame.key, priority, deadline, name)
+
+        try:
             if urgent:
                 request = await self._urge(frame, accept, deadline, ready)
             else:
                 request = await self._ask(frame, accept, deadline, ready, repeatable=repeatable)
+        finally:
+            self._admission.release(frame.key, priority)
 
         if request and request.outcome is Outcome.REPLY:
             value: R = request.value
@@ -193,10 +199,7 @@ class Link(Exchange[F]):
         Raises:
             ReplyTimeout: The link was too busy for so many seconds.
         """
-        if self._transport.in_flight > 1:
-            return nullcontext()
-
-        return self._admitted(None, Priority.QUEUED, self._loop.time() + timeout, name)
+        return nullcontext() if self._transport.in_flight > 1 else self._only(name, self._loop.time() + timeout)
 
     async def aclose(self) -> None:
         """Close the link; everybody who still waits gets ConnectionLost. Takes 2 s at most."""
@@ -204,19 +207,21 @@ class Link(Exchange[F]):
         await super().aclose()
 
     @asynccontextmanager
-    async def _admitted(self, key: Hashable, priority: Priority, deadline: float, what: str) -> AsyncIterator[None]:
-        """While this is entered, a request may be out; raise ReplyTimeout if it may not be by the deadline."""
-        if not self._admission.try_acquire(key, priority):
-            try:
-                async with asyncio.timeout_at(None if deadline == math.inf else deadline):
-                    await self._admission.acquire(key, priority)
-            except TimeoutError:
-                raise ReplyTimeout(f"the link to {self.url} was too busy to send {what} in time") from None
-
+    async def _only(self, what: str, deadline: float) -> AsyncIterator[None]:
+        """While this is entered, a queued command is out, and nothing else."""
+        await self._acquire(None, Priority.QUEUED, deadline, what)
         try:
             yield
         finally:
-            self._admission.release(key, priority)
+            self._admission.release(None, Priority.QUEUED)
+
+    async def _acquire(self, key: Hashable, priority: Priority, deadline: float, what: str) -> None:
+        """Return when a request may be out; raise ReplyTimeout if it may not be by the deadline."""
+        try:
+            async with asyncio.timeout_at(None if deadline == math.inf else deadline):
+                await self._admission.acquire(key, priority)
+        except TimeoutError:
+            raise ReplyTimeout(f"the link to {self.url} was too busy to send {what} in time") from None
 
     def _reopened(self) -> None:
         """Another stream begins."""
@@ -225,6 +230,7 @@ class Link(Exchange[F]):
     def _ended(self, error: ConnectionLost) -> None:
         """Tell everybody who waits."""
         self._correlator.fail(error)
+        self._deadlines.close()
         if self.state.value is LinkState.LOST:
             logger.warning("%s", error)
             self.on_lost(error)
@@ -250,6 +256,7 @@ class Link(Exchange[F]):
             self._note(False, frame)
             if not self._correlator.resolve(frame):
                 self._stats.unexpected += 1
+                self._stragglers.came(frame.key, self._arrived_at)
                 self.on_unsolicited(frame)
                 self.events.publish(Unexpected(frame))
 
