@@ -43,10 +43,10 @@ from dobot_async.toolpath.schedule import (
 from dobot_async.toolpath.toolpath import Toolpath
 from dobot_async.ultraarm.arm import UltraArm
 
-__all__ = ["Arm", "Drawing", "Progress", "draw", "engrave"]
+__all__ = ["Drawing", "DrawingArm", "Progress", "draw", "engrave"]
 
 logger = logging.getLogger("dobot_async.toolpath")
-Arm = Magician | UltraArm | MyCobot
+DrawingArm = Magician | UltraArm | MyCobot
 LOOK = 0.5  # seconds between two questions how far the arm is, while commands are sent: each takes the line for a while
 LEAST_KNOWN = 0.05  # of the time that was guessed, before how long it really takes is believed
 
@@ -97,7 +97,7 @@ class Drawing:
 
     def __init__(
         self,
-        arm: Arm,
+        arm: DrawingArm,
         toolpath: Toolpath,
         plane: WorkPlane,
         *,
@@ -267,7 +267,7 @@ class Drawing:
         return failure
 
 
-async def draw(arm: Arm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:
+async def draw(arm: DrawingArm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:
     """Draw a toolpath with a pen, and return when the arm has done it; see `Drawing`, which can be stopped.
 
     Args:
@@ -280,7 +280,7 @@ async def draw(arm: Arm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0
     await Drawing(arm, toolpath, plane, tool="pen", **options).run(first=first)
 
 
-async def engrave(arm: Arm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:
+async def engrave(arm: DrawingArm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:
     """Engrave a toolpath with a laser, which is off on every way out; see `draw`.
 
     The plane is that of the focus: the laser is moved in it, and lifted on the way to the first stroke alone. A dot is

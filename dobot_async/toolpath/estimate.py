@@ -170,8 +170,7 @@ def ultraarm(clock: Clock, tool: Tool) -> Bench:
 
     arm.session().receive(encode(u.HOME, u.HOME.request.encode(None)))
     clock.now += HOMING
-    here = place_of(arm.pose)
-    return Bench(arm, encode, here, UltraArmProgram(tool, here))
+    return Bench(arm, encode, place_of(arm.pose), UltraArmProgram(tool))
 
 
 def cobot(model: CobotModel, clock: Clock, pace: Pace, first: Place) -> Bench:

@@ -30,8 +30,6 @@ from dobot_async.wire import Command
 
 __all__ = ["Instruction", "Pace", "Program", "program_for"]
 
-STRAIGHT = getattr(u, "MOVE_LINE", u.MOVE_COORDS)  # G1, where the table has it
-PIECE = 5.0  # mm of one G0, which bulges by about PIECE²/8R off the straight line
 SLOWEST, FASTEST = 1.0, 200.0  # mm/s of an ultraArm
 SAFE_PERCENT = 20
 
@@ -113,9 +111,8 @@ class MagicianProgram:
 class UltraArmProgram:
     """G1 and M21."""
 
-    def __init__(self, tool: Tool, here: Place) -> None:
+    def __init__(self, tool: Tool) -> None:
         self._laser = tool == "laser"
-        self._here = here
 
     def instructions(self, moves: Iterable[Move]) -> Iterator[Instruction]:
         """Yield the commands of a drawing."""
@@ -131,23 +128,12 @@ class UltraArmProgram:
                 yield Instruction(u.SET_PWM, u.PWM(duty), None)
 
             speed = max(SLOWEST, min(FASTEST, move.speed))
-            for x, y, z in self._pieces(move.place):
-                yield Instruction(
-                    STRAIGHT, u.CoordsMove(round(x, 2), round(y, 2), round(z, 2), f=round(speed, 2)), move
-                )
+            x, y, z = (round(number, 2) for number in move.place)
+            yield Instruction(u.MOVE_LINE, u.CoordsMove(x, y, z, f=round(speed, 2)), move)
 
         if self._laser:
             yield Instruction(u.SET_PWM, u.PWM(0), None)
             yield Instruction(u.LASER_OFF, None, None)
-
-    def _pieces(self, there: Place) -> Iterator[Place]:
-        """A way, in pieces where the arm has no straight lines of its own."""
-        here, self._here = self._here, there
-        count = 1 if STRAIGHT is not u.MOVE_COORDS else max(1, math.ceil(math.dist(here, there) / PIECE))
-        for number in range(1, count + 1):
-            share = number / count
-            x, y, z = (a + share * (b - a) for a, b in zip(here, there, strict=True))
-            yield x, y, z
 
 
 class CobotProgram:
@@ -173,8 +159,7 @@ async def of_magician(arm: Magician, tool: Tool, pace: Pace) -> tuple[Place, Pro
 async def of_ultraarm(arm: UltraArm, tool: Tool, _: Pace) -> tuple[Place, Program]:
     """Where an ultraArm is, and how it is told."""
     coords = await arm.request(u.GET_COORDS, None)
-    here = coords.x, coords.y, coords.z
-    return here, UltraArmProgram(tool, here)
+    return (coords.x, coords.y, coords.z), UltraArmProgram(tool)
 
 
 async def of_cobot(arm: MyCobot, _: Tool, pace: Pace) -> tuple[Place, Program]:
