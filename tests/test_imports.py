@@ -1,6 +1,7 @@
 """The way of the imports, read from the source: layers know nothing of higher ones, and families not of each other.
 
-errors <- wire, util <- transports <- link <- queue <- arms <- families <- discovery <- simulator <- cli <- __main__
+errors <- wire, util <- transports <- link <- queue <- arms <- families <- discovery <- simulator <- toolpath <- cli
+<- __main__
 """
 
 from __future__ import annotations
@@ -22,13 +23,14 @@ FAMILIES = tuple(REGISTERED)
 LAYERS = (
     ("errors", "families"),
     ("wire", "events", "_core.util"),
-    ("layouts", "transports", "contract"),
+    ("layouts", "transports", "contract", "calibration", "grid"),
     ("_core.link", "rows"),
     ("_core.queue", "bridged", "program"),
     ("arms",),
     FAMILIES,
     ("discovery", "fleet"),
     ("simulator", "bridge"),
+    ("toolpath",),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )
@@ -112,6 +114,7 @@ def test_modules_are_named_as_strings_in_the_places_alone_that_import_late() -> 
 @pytest.mark.parametrize("statement", ["import dobot_async", "from dobot_async import Magician, open_transport"])
 def test_importing_the_package_brings_in_nothing_that_is_not_used_yet(statement: str) -> None:
     late = ["serial", "serial_asyncio", "bleak", "zenoh", "click", "rich", "dobot_async.simulator", "dobot_async.cli"]
+    late += ["dobot_async.toolpath", "svgelements", "ezdxf", "PIL", "numpy", "potrace", "HersheyFonts"]
     late += [f"dobot_async.{family}.commands" for family in FAMILIES] if statement == "import dobot_async" else []
     program = f"{statement}\nimport sys\nprint([name for name in {late!r} if name in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)

@@ -1,0 +1,177 @@
+"""A toolpath on a work plane as the moves of an arm: no arm is known here, and nothing is sent.
+
+pen     travel --lower--> draw draw draw --lift--> travel ...      the tool is lifted between strokes
+laser   travel --lower--> draw draw draw, jump, draw draw ...      the laser is off between strokes, at one height
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Literal
+
+from dobot_async.toolpath.errors import UnreachableStroke
+from dobot_async.toolpath.plane import Place, WorkPlane
+from dobot_async.toolpath.stroke import Stroke
+from dobot_async.toolpath.toolpath import Toolpath
+
+__all__ = ["Kind", "Move", "Reach", "Tool", "approach", "check_moves", "fastest", "moves_of"]
+
+Tool = Literal["pen", "laser"]
+Reach = Callable[[Place], None]
+"""Told x, y, z of the arm in mm, raises ValueError with the reason where it cannot go there."""
+
+SAME = 0.01  # mm; nearer points are one for an arm
+DOT = 0.1  # mm: how long a dot of a laser is, which must move to burn
+LOOK = 5.0  # mm between two looks at the reach
+
+
+class Kind(Enum):
+    """What a move is for."""
+
+    TRAVEL = "travel"
+    LOWER = "lower"
+    DRAW = "draw"
+    JUMP = "jump"
+    LIFT = "lift"
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """One straight way.
+
+    Attributes:
+        kind: What it is for.
+        place: Where it ends, x, y, z of the arm in mm.
+        power: Percent, on the way; 0 where nothing is drawn.
+        speed: mm/s of the stroke that it belongs to.
+        stroke: The number of that stroke.
+        point: The number of the point in the stroke as it is drawn, to which it leads.
+    """
+
+    kind: Kind
+    place: Place
+    power: float
+    speed: float
+    stroke: int
+    point: int = 0
+
+
+def moves_of(toolpath: Toolpath, plane: WorkPlane, tool: Tool, speeds: Sequence[float]) -> list[list[Move]]:
+    """Return the moves of each stroke, from above its start (the laser: at it) to above its end."""
+    make = pen_moves if tool == "pen" else laser_moves
+    return [
+        list(make(stroke.without_repeats(SAME), number, plane, speed))
+        for number, (stroke, speed) in enumerate(zip(toolpath.strokes, speeds, strict=True))
+    ]
+
+
+def pen_moves(stroke: Stroke, number: int, plane: WorkPlane, speed: float) -> Iterator[Move]:
+    """Over the start, down, along, and up."""
+    powers = stroke.powers
+    yield Move(Kind.TRAVEL, plane.to_arm(*stroke.start, plane.lift), 0.0, speed, number)
+    yield Move(Kind.LOWER, plane.pressed(stroke.start, powers[0]), 0.0, speed, number)
+    for point, (place, power) in enumerate(zip(stroke.points[1:], powers[1:], strict=True), 1):
+        yield Move(Kind.DRAW, plane.pressed(place, power), power, speed, number, point)
+
+    yield Move(Kind.LIFT, plane.to_arm(*stroke.end, plane.lift), 0.0, speed, number, len(powers) - 1)
+
+
+def laser_moves(stroke: Stroke, number: int, plane: WorkPlane, speed: float) -> Iterator[Move]:
+    """To the start without power, and along."""
+    points, powers = stroke.points, stroke.powers
+    if len(points) == 1:
+        points, powers = (points[0], (points[0][0] + DOT, points[0][1])), powers * 2
+
+    yield Move(Kind.JUMP, plane.to_arm(*points[0]), 0.0, speed, number)
+    for point, (place, power) in enumerate(zip(points[1:], powers[1:], strict=True), 1):
+        yield Move(Kind.DRAW, plane.to_arm(*place), power, speed, number, point)
+
+
+def approach(here: Place, moves: Sequence[Move], plane: WorkPlane) -> list[Move]:
+    """Return the moves from where the arm is to the first of a drawing: up, across, and for a laser down."""
+    first = moves[0]
+    at = plane.to_plane(*here)
+    above = plane.to_plane(*first.place)
+    found = []
+    if at.height < plane.lift - SAME:
+        found.append(replace(first, kind=Kind.TRAVEL, place=plane.to_arm(at.x, at.y, plane.lift)))
+
+    if first.kind is Kind.JUMP:
+        found.append(replace(first, kind=Kind.TRAVEL, place=plane.to_arm(above.x, above.y, plane.lift)))
+        found.append(replace(first, kind=Kind.LOWER))
+
+    return found
+
+
+def check_moves(moves: Iterable[Move], reach: Reach, here: Place | None = None) -> None:
+    """Look at the reach every few mm of all moves; `here` is where the first one begins.
+
+    Raises:
+        UnreachableStroke: The first place that cannot be reached.
+    """
+    for move in moves:
+        for place in places(here, move.place):
+            try:
+                reach(place)
+            except ValueError as error:
+                way = "" if move.kind is Kind.DRAW else f" ({ON_THE_WAY[move.kind]})"
+                alarm = getattr(error, "alarm", None)
+                named = {} if alarm is None else {"alarm": alarm}
+                raise UnreachableStroke(move.stroke, move.point, place, f"{error}{way}", **named) from None
+
+        here = move.place
+
+
+ON_THE_WAY = {
+    Kind.TRAVEL: "on the way to the stroke, above the paper",
+    Kind.LOWER: "where the stroke begins",
+    Kind.JUMP: "on the way to the stroke",
+    Kind.LIFT: "above the paper, where the stroke ends",
+}
+
+
+def places(here: Place | None, there: Place) -> Iterator[Place]:
+    """Places on a way, every few mm, its end the last."""
+    count = max(1, math.ceil(math.dist(here, there) / LOOK)) if here else 1
+    for number in range(1, count):
+        share = number / count
+        yield tuple(a + share * (b - a) for a, b in zip(here or there, there, strict=True))  # type: ignore[misc]
+
+    yield there
+
+
+def fastest(moves: Sequence[Move], rate: float, depth: int) -> float:
+    """Return the speed in mm/s at which an arm uses up no more than `rate` moves per second of an unbroken series.
+
+    A queue of `depth` moves evens out what is shorter than that.
+    """
+    best = math.inf
+    lengths: list[float] = []
+    here: Place | None = None
+    for move in moves:
+        if move.kind in {Kind.DRAW, Kind.JUMP} and here is not None:
+            lengths.append(math.dist(here, move.place))
+        else:
+            best = min(best, slowest_window(lengths, depth))
+            lengths = []
+
+        here = move.place
+
+    return min(best, slowest_window(lengths, depth)) * rate
+
+
+def slowest_window(lengths: Sequence[float], depth: int) -> float:
+    """The least mean length of `depth` moves in a row, mm; infinite where there are not so many."""
+    if len(lengths) <= depth:
+        return math.inf
+
+    total = sum(lengths[:depth])
+    least = total
+    for gone, come in zip(lengths, lengths[depth:], strict=False):
+        total += come - gone
+        least = min(least, total)
+
+    return max(least, 0.0) / depth

@@ -1,0 +1,93 @@
+"""Where each family's arm can go, as far as the driver knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dobot_async.magician.arm import Magician
+from dobot_async.magician.kinematics import BEYOND_LIMIT, Kinematics, Unreachable
+from dobot_async.mycobot.arm import MyCobot
+from dobot_async.mycobot.models import CobotModel
+from dobot_async.toolpath.moves import Reach
+from dobot_async.toolpath.plane import Place, WorkPlane
+from dobot_async.ultraarm.arm import UltraArm
+from dobot_async.ultraarm.params import CoordsMove, UltraArmLimits
+
+__all__ = ["reach_of", "reachable"]
+
+
+def of_kinematics(kinematics: Kinematics) -> Reach:
+    """The Magician's joints and their limits; the tool's rotation is left as it is, and not looked at."""
+
+    def check(place: Place) -> None:
+        j1, j2, j3, _ = kinematics.inverse(*place, 0.0)
+        problems = kinematics.limits.problems((j1, j2, j3, 0.0))
+        if problems:
+            raise Unreachable("; ".join(problems), BEYOND_LIMIT)
+
+    return check
+
+
+def of_limits(limits: UltraArmLimits) -> Reach:
+    """The ultraArm's ranges of x, y and z."""
+    return lambda place: limits.check(CoordsMove(*place))
+
+
+def of_model(model: CobotModel) -> Reach:
+    """The myCobot's ranges of x, y and z."""
+
+    def check(place: Place) -> None:
+        for axis, value in enumerate(place, 1):
+            model.check_coord(axis, value)
+
+    return check
+
+
+REACHES: Mapping[type, Callable[[Any], Reach]] = {
+    Magician: lambda arm: of_kinematics(arm.kinematics),
+    Kinematics: of_kinematics,
+    UltraArm: lambda arm: of_limits(arm.limits),
+    UltraArmLimits: of_limits,
+    MyCobot: lambda arm: of_model(arm.model),
+    CobotModel: of_model,
+}
+
+
+def reach_of(arm: object) -> Reach:
+    """Return what raises ValueError, with the reason, for a place of the arm that it cannot go to.
+
+    Args:
+        arm: A connected arm; or `Kinematics`, `UltraArmLimits`, a `CobotModel`, for one that is not there.
+
+    Raises:
+        TypeError: It is something else.
+    """
+    for kind, make in REACHES.items():
+        if isinstance(arm, kind):
+            return make(arm)
+
+    raise TypeError(f"expected an arm, Kinematics, UltraArmLimits or a CobotModel, not {arm!r}")
+
+
+def reachable(arm: object, plane: WorkPlane) -> Callable[[float, float], bool]:
+    """Return what tells whether the arm can draw at a place of the plane, and lift the pen there.
+
+    For `Toolpath.split` and `preview`.
+
+    Args:
+        arm: As for `reach_of`.
+        plane: Where the paper lies.
+    """
+    check = reach_of(arm)
+
+    def inside(x: float, y: float) -> bool:
+        try:
+            check(plane.to_arm(x, y, -plane.press))
+            check(plane.to_arm(x, y, plane.lift))
+        except ValueError:
+            return False
+
+        return True
+
+    return inside

@@ -1,0 +1,17 @@
+;Header Start
+;tool_head: laser
+G90
+G21
+M106 S0
+M3 P0
+M5
+G0 X5 Y5 F3000
+M3 P50 S127.5
+G1 X15 Y5 F600
+G91
+G1 Y10
+G1 X-10
+G90
+G1 X5 Y5
+M5
+G28
