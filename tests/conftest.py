@@ -29,8 +29,8 @@ OWNED_BY_THE_LOOP = ("asyncio_", "asyncio-waitpid", "AnyIO worker thread")
 
 def pytest_configure(config: pytest.Config) -> None:
     """Registers the mark, and lets programs that tests start hear the signals that a background job ignores."""
-    for name in ("SIGINT", "SIGHUP"):
-        number = getattr(signal, name, None)  # not every system has both
+    for name in ("SIGINT", "SIGHUP", "SIGQUIT"):
+        number = getattr(signal, name, None)  # not every system has them all
         if number and signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, lambda *_: None)  # what is ignored stays so in programs, what is handled does not
 
