@@ -14,14 +14,11 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any, SupportsFloat
 
-from dobot_async._core.util.arguments import check_duration
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, another
 from dobot_async.magician.arm import Magician
@@ -29,6 +26,7 @@ from dobot_async.mycobot.arm import MyCobot
 from dobot_async.toolpath.moves import Move, Tool, approach, check_moves, from_point
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.position import Position, Sent, along, stand_of
+from dobot_async.toolpath.progress import Progress, ProgressMeter
 from dobot_async.toolpath.programs import Instruction, Pace, check_tool, program_for
 from dobot_async.toolpath.reach import reach_of
 from dobot_async.toolpath.schedule import (
@@ -39,37 +37,17 @@ from dobot_async.toolpath.schedule import (
     guess,
     planned,
     position_in,
+    simplified,
     whole_percent,
 )
 from dobot_async.toolpath.toolpath import Toolpath
 from dobot_async.ultraarm.arm import UltraArm
 
-__all__ = ["Drawing", "DrawingArm", "Progress", "draw", "engrave"]
+__all__ = ["Drawing", "DrawingArm", "draw", "engrave"]
 
-logger = logging.getLogger("dobot_async.toolpath")
 DrawingArm = Magician | UltraArm | MyCobot
 LOOK = 0.5  # seconds between two questions how far the arm is, while commands are sent: each takes the line for a while
 LOCATING = 1.0  # seconds for finding out where a stopped arm was
-LEAST_KNOWN = 0.05  # of the time that was guessed, before how long it really takes is believed
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a drawing is.
-
-    Attributes:
-        strokes: How many are done, those before the one with which it began among them.
-        of: How many there are.
-        mm: How much was drawn, mm.
-        of_mm: How much there is to draw.
-        seconds_left: How long it will still take, by how long it has taken so far.
-    """
-
-    strokes: int
-    of: int
-    mm: float
-    of_mm: float
-    seconds_left: float
 
 
 class Drawing:
@@ -87,11 +65,6 @@ class Drawing:
         rate: Commands per second that the line carries; where many short ways follow one another the speed of a
             Magician is made so low that the arm does not use up its queue. None does not look.
         progress: Called with a `Progress` when something was done.
-
-    Attributes:
-        next_stroke: The first stroke that is not known to be done: with it `run` goes on.
-        next_point: How far a laser was in it, in points of the stroke as it is drawn: 7.25 is a quarter of the way from
-            point 7 to point 8. 0 for a pen.
 
     Raises:
         UnreachableStroke: The arm cannot go there; it names stroke, point and reason.
@@ -117,44 +90,35 @@ class Drawing:
         if speed is not None and isinstance(arm, MyCobot):
             raise ValueError("a myCobot knows no speed in mm/s: give percent= (1 to 100) instead")
 
-        if not toolpath.strokes:
-            raise ValueError("there is nothing to draw: the toolpath has no strokes")
-
         self._arm = arm
         self._plane = plane
         self._tool = tool
         self._reach = reach_of(arm)
         self._pace = Pace(above_zero(acceleration, "acceleration"), whole_percent(percent))
-        path = toolpath.simplify(check_duration(tolerance, "tolerance"))
+        path = simplified(toolpath, tolerance)
         self._strokes = planned(path, plane, tool, speed, rate if isinstance(arm, Magician) else None)
-        self._lengths = [stroke.length for stroke in path]
-        self._guess = [guess(moves) for moves in self._strokes]
+        lengths, guesses = [stroke.length for stroke in path], [guess(moves) for moves in self._strokes]
+        self._meter = ProgressMeter(lengths, guesses, progress)
         check_moves((move for moves in self._strokes for move in moves), self._reach)
-        self._progress = progress
         self._running: asyncio.Task[Any] | None = None
         self._stopped = False
         self._epoch: Any = None
-        self._began = 0.0
-        self._taken = (0.0, 0.0)  # seconds that what is done has taken, and was guessed to take
         self._position = Position(0)
 
     @property
     def next_stroke(self) -> int:
-        """The first stroke that is not known to be done."""
+        """The first stroke that is not known to be done: with it `run` goes on."""
         return self._position.stroke
 
     @property
     def next_point(self) -> float:
-        """How far a laser was in it, in points."""
+        """How far a laser was in it, in points as drawn: 7.25 is a quarter of the way from point 7 to 8. 0 for a pen."""
         return self._position.point
 
     @property
     def progress(self) -> Progress:
         """How far it is."""
-        done, total, guessed = self.next_stroke, sum(self._lengths), sum(self._guess[self.next_stroke :])
-        taken, of = self._taken
-        slower = taken / of if of > LEAST_KNOWN * sum(self._guess) else 1.0
-        return Progress(done, len(self._strokes), sum(self._lengths[:done]), total, guessed * slower)
+        return self._meter.progress(self.next_stroke)
 
     async def run(self, *, first: int | None = None, point: SupportsFloat = 0.0) -> None:
         """Draw, from `next_stroke` and `next_point` on; return when the arm has done all of it.
@@ -180,7 +144,7 @@ class Drawing:
         if self.next_stroke == len(self._strokes):
             return
 
-        self._running, self._stopped, self._taken = asyncio.current_task(), False, (0.0, 0.0)
+        self._running, self._stopped = asyncio.current_task(), False
         self._epoch = getattr(self._arm.queue, "epoch", None)  # which a stop by anybody ends, where the queue has one
         try:
             here, program = await program_for(self._arm, self._tool, self._pace)
@@ -197,7 +161,7 @@ class Drawing:
 
     def how_to_go_on(self) -> str:
         """Return the arguments with which the rest is drawn, for the note on an error."""
-        return f"first={self.next_stroke}" + (f", point={self.next_point:.4f}" if self.next_point else "")
+        return f"first={self.next_stroke}" + (f", point={self.next_point}" if self.next_point else "")
 
     def _moves(self, here: Place) -> list[Move]:
         """All moves that are still to be made."""
@@ -208,7 +172,7 @@ class Drawing:
     async def _draw(self, instructions: Sequence[Instruction], here: Place) -> None:
         """Put all commands, and wait until they are done; on another way out, stop."""
         pending: deque[Sent] = deque()
-        self._began = asyncio.get_running_loop().time()
+        self._meter.begin(asyncio.get_running_loop().time())
         watcher = asyncio.create_task(self._watch(pending), name="dobot_async progress of a drawing")
         try:
             await self._put(instructions, here, pending)
@@ -298,16 +262,7 @@ class Drawing:
         """Note how far it is, and tell it if strokes were done."""
         before = self.next_stroke
         self._position = position if self._tool == "laser" else Position(position.stroke)
-        if self.next_stroke == before:
-            return
-
-        now = asyncio.get_running_loop().time()
-        self._taken = now - self._began, self._taken[1] + sum(self._guess[before : self.next_stroke])
-        if self._progress:
-            try:
-                self._progress(self.progress)
-            except Exception:
-                logger.exception("progress= of a drawing failed")
+        self._meter.reached(before, self.next_stroke, asyncio.get_running_loop().time())
 
 
 async def draw(arm: DrawingArm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:

@@ -25,6 +25,7 @@ __all__ = ["Position", "Sent", "Stand", "along", "stand_of"]
 
 NEAR = 0.3  # mm by which an arm may stand beside the way on which it was stopped
 LOOKS = 20
+FINE = 10_000  # parts of a way that are told apart
 PAUSE = 0.02  # seconds between two looks at an arm that comes to rest
 
 
@@ -132,7 +133,12 @@ def stopped_on(sent: Sent, share: float, position: Position) -> Position:
     if move.kind is Kind.LIFT or share >= 1:  # which begins when all of the stroke is drawn
         return sent.passed(position)
 
-    return max(position, Position(move.stroke, move.point - 1 + share)) if move.kind is Kind.DRAW else position
+    if move.kind is not Kind.DRAW:
+        return position
+
+    # A way on which it had been stopped before begins there.
+    start = max(position, Position(move.stroke, move.point - 1)).point
+    return Position(move.stroke, math.floor((start + share * (move.point - start)) * FINE) / FINE)
 
 
 def share_of(sent: Sent, place: Place) -> float | None:

@@ -7,14 +7,14 @@ from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 from typing import Any, SupportsFloat
 
-from dobot_async._core.util.arguments import to_float
+from dobot_async._core.util.arguments import check_duration, to_float
 from dobot_async.toolpath.moves import Kind, Move, Tool, fastest, moves_of
 from dobot_async.toolpath.plane import WorkPlane
 from dobot_async.toolpath.position import Position
 from dobot_async.toolpath.programs import Instruction
 from dobot_async.toolpath.toolpath import Toolpath
 
-__all__ = ["RATE", "TOLERANCE", "above_zero", "batches", "guess", "planned", "position_in", "whole_percent"]
+__all__ = ["RATE", "TOLERANCE", "above_zero", "batches", "guess", "planned", "position_in", "simplified", "whole_percent"]
 
 SPEEDS: dict[Tool, float] = {"pen": 50.0, "laser": 20.0}
 TOLERANCE = 0.05  # mm; a third of what an arm repeats
@@ -22,6 +22,14 @@ BATCH = 24  # commands that are put together: fewer than an arm's queue holds
 RATE = 120.0  # commands per second that a line of 115200 baud carries with room to spare
 DEPTH = 24  # commands that lie ready in the arm while more come
 PER_MOVE = 0.15  # seconds that a move of the pen takes beside its way, for the first guess of the time that is left
+
+
+def simplified(toolpath: Toolpath, tolerance: SupportsFloat) -> Toolpath:
+    """The toolpath as it is drawn; raises ValueError for one without strokes."""
+    if not toolpath.strokes:
+        raise ValueError("there is nothing to draw: the toolpath has no strokes")
+
+    return toolpath.simplify(check_duration(tolerance, "tolerance"))
 
 
 def planned(
