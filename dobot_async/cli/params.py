@@ -14,7 +14,17 @@ import click
 from dobot_async.cli.failures import WrongFile
 from dobot_async.program.text import LARGEST, read_text
 
-__all__ = ["ABOVE_ZERO", "DURATION", "PROGRAM", "Place", "Text", "standard_input"]
+__all__ = [
+    "ABOVE_ZERO",
+    "DURATION",
+    "FINITE",
+    "NOT_BELOW_ZERO",
+    "PERCENT",
+    "PROGRAM",
+    "Place",
+    "Text",
+    "standard_input",
+]
 
 PORTS = range(1 << 16)
 MOST_SECONDS = 86400.0  # a day
@@ -97,4 +107,7 @@ def standard_input() -> bytes:
 
 PROGRAM = TextFile()
 ABOVE_ZERO = FiniteRange(0, min_open=True)
+FINITE = FiniteRange()
+NOT_BELOW_ZERO = FiniteRange(0)
+PERCENT = FiniteRange(0, 100, min_open=True)
 DURATION = FiniteRange(0, max=MOST_SECONDS)

@@ -26,8 +26,8 @@ from dobot_async.mycobot.arm import MyCobot
 from dobot_async.toolpath.moves import Move, Tool, approach, check_moves, from_point
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.position import Position, Sent, along, stand_of
-from dobot_async.toolpath.progress import Progress, ProgressMeter
 from dobot_async.toolpath.programs import Instruction, Pace, check_tool, program_for
+from dobot_async.toolpath.progress import Progress, ProgressMeter
 from dobot_async.toolpath.reach import reach_of
 from dobot_async.toolpath.schedule import (
     RATE,
@@ -112,7 +112,7 @@ class Drawing:
 
     @property
     def next_point(self) -> float:
-        """How far a laser was in it, in points as drawn: 7.25 is a quarter of the way from point 7 to 8. 0 for a pen."""
+        """How far a laser was in it, in points: 7.25 is a quarter of the way from point 7 to point 8. 0 for a pen."""
         return self._position.point
 
     @property
@@ -128,7 +128,7 @@ class Drawing:
 
         Args:
             first: The stroke, from 0, to begin with.
-            point: Of a laser: how far in this stroke, in points, as `next_point`. Tolerance and toolpath must be the same.
+            point: Of a laser: how far in this stroke, as `next_point` of the same toolpath with the same tolerance.
 
         Raises:
             UnreachableStroke: The way from where the arm is to the first stroke is out of reach; nothing was sent.
@@ -205,10 +205,11 @@ class Drawing:
 
     def _note(self) -> str:
         """What is said of the rest."""
-        return (
-            f"stroke {self.next_stroke} of {len(self._strokes)} (from 0) is not known to be done; "
-            f"{self.how_to_go_on()} goes on with it"
-        )
+        if self.next_stroke == len(self._strokes):
+            return "all strokes are done; it is not known whether the tool was lifted after the last one"
+
+        which = f"stroke {self.next_stroke} (of {len(self._strokes)}, from 0)"
+        return f"{which} is not known to be done; {self.how_to_go_on()} draws the rest"
 
     async def _locate(self, pending: deque[Sent]) -> None:
         """Find out how far a stopped arm was, within the time that a way out has."""

@@ -71,11 +71,11 @@ class Stand(NamedTuple):
     """Where an arm stands after a stop.
 
     Attributes:
-        index: Of the command that it was doing, or of the one before that: firmware may count either.
+        command: The index of what it was doing, or of the command before that: firmware may count either.
         place: mm.
     """
 
-    index: int
+    command: int
     place: Place
 
 
@@ -115,10 +115,10 @@ def along(pending: Iterable[Sent], stand: Stand, position: Position) -> Position
     done = position
     for each in pending:
         index = each.motion.index
-        if index is None or index > stand.index + 1:
+        if index is None or index > stand.command + 1:
             break
 
-        if index >= stand.index and each.move and (share := share_of(each, stand.place)) is not None:
+        if index >= stand.command and each.move and (share := share_of(each, stand.place)) is not None:
             return stopped_on(each, share, done)
 
         done = each.passed(done)

@@ -14,7 +14,17 @@ from dobot_async.toolpath.position import Position
 from dobot_async.toolpath.programs import Instruction
 from dobot_async.toolpath.toolpath import Toolpath
 
-__all__ = ["RATE", "TOLERANCE", "above_zero", "batches", "guess", "planned", "position_in", "simplified", "whole_percent"]
+__all__ = [
+    "RATE",
+    "TOLERANCE",
+    "above_zero",
+    "batches",
+    "guess",
+    "planned",
+    "position_in",
+    "simplified",
+    "whole_percent",
+]
 
 SPEEDS: dict[Tool, float] = {"pen": 50.0, "laser": 20.0}
 TOLERANCE = 0.05  # mm; a third of what an arm repeats
@@ -92,7 +102,9 @@ def position_in(strokes: Sequence[Sequence[Move]], stroke: Any, point: SupportsF
         raise TypeError(f"first must be the number of a stroke, not {stroke!r}")
 
     if not 0 <= stroke < len(strokes):
-        raise ValueError(f"first must be in 0 to {len(strokes) - 1}, for there are {len(strokes)} strokes, not {stroke!r}")
+        raise ValueError(
+            f"first must be in 0 to {len(strokes) - 1}, for there are {len(strokes)} strokes, not {stroke!r}"
+        )
 
     found = to_float(point, "point")
     if found and tool != "laser":
