@@ -141,8 +141,8 @@ about_pictures = several(
     click.option(
         "--mode",
         type=click.Choice(MODES),
-        help="How a picture becomes strokes: black where it is dark (threshold), dithered (floyd-steinberg, the default, "
-        "or atkinson), by power (grey), dots (halftone), or outlines.",
+        help="How a picture becomes strokes: black where it is dark (threshold), dithered (floyd-steinberg, the "
+        "default, or atkinson), by power (grey), dots (halftone), or outlines.",
     ),
     click.option("--line", type=ABOVE_ZERO, help="mm between two lines of a picture.  [default: 0.4]"),
     click.option("--keep-order", is_flag=True, help="Draw strokes in the file's order, not with little travel."),

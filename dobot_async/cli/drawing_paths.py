@@ -83,7 +83,7 @@ def of_picture(file: Path, size: Size, mode: str | None, line: float | None) -> 
 
 
 def of_text(text: str, size: Size, height: float | None, font: str, align: Any) -> Toolpath:
-    """A text; "\\n" in it begins a line."""
+    r"""A text; \n in it begins a line."""
     if size and height is not None:
         raise click.UsageError("give --size or --height, not both")
 

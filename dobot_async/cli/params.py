@@ -66,6 +66,16 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+class FiniteNumber(click.ParamType[float]):
+    """Numbers, below 0 as well."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Reads a number."""
+        return EVERY.convert(value, param, ctx)
+
+
 class Text(NamedTuple):
     """The text of a file.
 
@@ -106,8 +116,9 @@ def standard_input() -> bytes:
 
 
 PROGRAM = TextFile()
+EVERY = FiniteRange()
 ABOVE_ZERO = FiniteRange(0, min_open=True)
-FINITE = FiniteRange()
+FINITE = FiniteNumber()
 NOT_BELOW_ZERO = FiniteRange(0)
 PERCENT = FiniteRange(0, 100, min_open=True)
 DURATION = FiniteRange(0, max=MOST_SECONDS)

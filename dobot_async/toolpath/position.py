@@ -4,8 +4,8 @@
                  done  |--x                       a stop: the arm's index says 12, and it stands on the way 12
 
 A stop ends all Motions, done or not, and how far the arm is was last asked half a second before: short strokes that
-were done meanwhile would be drawn twice. A Magician tells it when it stands, by two things that have to agree: the index
-of the command that was ended, and the place. If they do not, what was known before is all that is known.
+were done meanwhile would be drawn twice. A Magician tells it when it stands, by two things that have to agree: the
+command that was ended, by its index, and the place. If they do not, what was known before is all that is known.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""An engraving that is interrupted at any moment, and gone on with: what the simulated arm recorded decides.
-
-Each way that was burnt is in the arm's record with its end and its outcome; one that was broken off ended where the arm
-stood when it was interrupted. What is burnt once, and wholly, is as long as the toolpath, and has each of its ends once.
-"""
+"""An engraving that is interrupted at any moment, and gone on with: what the simulated arm recorded decides."""
 
 from __future__ import annotations
 
@@ -12,6 +8,7 @@ import random
 from typing import Any
 
 import pytest
+from burner import Burner, ends_of
 from virtual import run_virtual, virtual
 
 from dobot_async import Magician, MotionStopped, UltraArm
@@ -36,40 +33,6 @@ def dashes(rows: int = 5) -> Toolpath:
     strokes.append(Stroke(zigzag, tuple(10.0 + 5 * x for x in range(12))))
     strokes.append(Stroke(((0.0, 10.0), (40.0, 10.0)), 70))
     return Toolpath(tuple(strokes))
-
-
-class Burner:
-    """What a simulated Magician has burnt: the ends of whole ways in order, and the length of all of it."""
-
-    def __init__(self, sim: Simulation) -> None:
-        self._sim = sim
-        self._seen = 0
-        self._place = (0.0, 0.0, 0.0)
-        self.ends: list[tuple[float, float]] = []
-        self.length = 0.0
-
-    def look(self) -> None:
-        """Take what was recorded since; the arm must stand where that has ended."""
-        new, pose = self._sim.arm.executed[self._seen :], self._sim.arm.pose
-        self._seen += len(new)
-        records = [record for record in new if record.command in {m.SET_CPLE_CMD, m.SET_PTP_CMD}]
-        for number, record in enumerate(records):
-            value = record.value
-            target = (value.x, value.y, value.z)
-            broken = record.outcome != "done"
-            assert not broken or number == len(records) - 1, "something went on after it"
-            end = (pose.x, pose.y, pose.z) if broken else target
-            if record.command is m.SET_CPLE_CMD and value.power:
-                self.length += math.dist(self._place, end)
-                if not broken or math.dist(end, target) < 0.01:
-                    self.ends.append((round(value.x, 2), round(value.y, 2)))
-
-            self._place = end
-
-
-def ends_of(path: Toolpath, plane: WorkPlane) -> list[tuple[float, float]]:
-    places = [plane.to_arm(*point) for stroke in path for point in stroke.points[1:]]
-    return [(round(x, 2), round(y, 2)) for x, y, _ in places]
 
 
 async def interrupt(drawing: Drawing, arm: Any, how: str, seconds: float, how_to_begin: dict[str, Any]) -> bool:
@@ -99,7 +62,7 @@ async def interrupt(drawing: Drawing, arm: Any, how: str, seconds: float, how_to
     with pytest.raises(expected.get(how, MotionStopped)) as caught:
         await task
 
-    if how not in {"timeout"}:
+    if how != "timeout":
         assert f"{drawing.how_to_go_on()} draws the rest" in "".join(getattr(caught.value, "__notes__", ()))
 
     return True
@@ -221,6 +184,11 @@ def test_what_is_not_known_to_be_done_is_burnt_again_and_nothing_is_left_out(how
     run_virtual(run())
 
 
+async def until_it_stands(sim: Simulation) -> None:
+    while sim.arm.device.moving:  # noqa: ASYNC110 - no event tells it
+        await asyncio.sleep(0.0005)
+
+
 @virtual
 async def test_an_index_that_does_not_agree_with_the_place_is_not_believed() -> None:
     path = dashes()
@@ -230,9 +198,7 @@ async def test_an_index_that_does_not_agree_with_the_place_is_not_believed() -> 
         await asyncio.sleep(8)
         known = drawing.next_stroke
         task.cancel()
-        while sim.arm.device.moving:
-            await asyncio.sleep(0.0005)
-
+        await until_it_stands(sim)
         sim.arm.guide_to(250, 50, 0)  # somebody has pushed it meanwhile
         with pytest.raises(asyncio.CancelledError):
             await task
