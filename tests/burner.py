@@ -10,9 +10,9 @@ import math
 
 from dobot_async.magician import commands as m
 from dobot_async.simulator import Simulation
-from dobot_async.toolpath import Toolpath, WorkPlane
+from dobot_async.toolpath import Stroke, Toolpath, WorkPlane
 
-__all__ = ["Burner", "ends_of"]
+__all__ = ["Burner", "as_burnt", "ends_of"]
 
 
 class Burner:
@@ -42,6 +42,16 @@ class Burner:
                     self.ends.append((round(value.x, 2), round(value.y, 2)))
 
             self._place = end
+
+
+def as_burnt(path: Toolpath) -> Toolpath:
+    """It with dots as the lines of 0.1 mm that the documentation promises."""
+    return Toolpath(
+        tuple(
+            stroke if len(stroke.points) > 1 else Stroke((stroke.start, (stroke.start[0] + 0.1, stroke.start[1])))
+            for stroke in path
+        )
+    )
 
 
 def ends_of(path: Toolpath, plane: WorkPlane) -> list[tuple[float, float]]:

@@ -47,13 +47,13 @@ class Sent(NamedTuple):
     Attributes:
         motion: The command.
         move: The move that it is of, None for settings.
-        start: Where the move begins, None if nothing tells.
+        start: Where the arm is before it.
         ends: Whether its stroke ends with it.
     """
 
     motion: Motion
     move: Move | None
-    start: Place | None
+    start: Place
     ends: bool
 
     def passed(self, position: Position) -> Position:
@@ -118,7 +118,7 @@ def along(pending: Iterable[Sent], stand: Stand, position: Position) -> Position
         if index is None or index > stand.command + 1:
             break
 
-        if index >= stand.command and each.move and (share := share_of(each, stand.place)) is not None:
+        if index >= stand.command and (share := share_of(each, stand.place)) is not None:
             return stopped_on(each, share, done)
 
         done = each.passed(done)
@@ -129,7 +129,9 @@ def along(pending: Iterable[Sent], stand: Stand, position: Position) -> Position
 def stopped_on(sent: Sent, share: float, position: Position) -> Position:
     """The position of an arm that was stopped on a way, of which a share lies behind it."""
     move = sent.move
-    assert move
+    if not move:
+        return position
+
     if move.kind is Kind.LIFT or share >= 1:  # which begins when all of the stroke is drawn
         return sent.passed(position)
 
@@ -143,13 +145,9 @@ def stopped_on(sent: Sent, share: float, position: Position) -> Position:
 
 def share_of(sent: Sent, place: Place) -> float | None:
     """How much of a way lies behind a place on it, 0 to 1; None for a place that is not on it."""
-    assert sent.move
-    end = sent.move.place
+    end = sent.move.place if sent.move else sent.start
     if math.dist(place, end) < SAME:
         return 1.0
-
-    if sent.start is None:
-        return None
 
     way = tuple(b - a for a, b in zip(sent.start, end, strict=True))
     length = math.hypot(*way)

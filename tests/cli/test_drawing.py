@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from burner import Burner, ends_of
+from burner import Burner, as_burnt, ends_of
 from click.testing import CliRunner, Result
 from PIL import Image
 
@@ -335,9 +335,11 @@ async def until_it_burns(sim: Simulation, seconds: float, process: Process) -> N
 @pytest.mark.parametrize("seed", range(3))
 async def test_ctrl_c_switches_the_laser_off_and_the_rest_is_burnt_once(seed: int) -> None:
     chance, picture, options = random.Random(seed), FILES / "shapes.png", ["--size", "24", "24", "--line", "2"]
-    width, height = Image.open(picture).size
+    with Image.open(picture) as opened:
+        width, height = opened.size
+
     path = read_picture(picture, width=min(24, 24 * width / height), line=2)
-    path = path.translate(-path.bounds.left, -path.bounds.bottom)
+    path = as_burnt(path.translate(-path.bounds.left, -path.bounds.bottom))
     async with simulate(listen="tcp://127.0.0.1:0", speed=4) as sim:
         burner, begin, times = Burner(sim), "0", 0
         for _ in range(20):
