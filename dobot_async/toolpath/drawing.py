@@ -206,7 +206,7 @@ class Drawing:
     def _note(self) -> str:
         """What is said of the rest."""
         if self.next_stroke == len(self._strokes):
-            return "all strokes are done; it is not known whether the tool was lifted after the last one"
+            return "all strokes are done" + ("; the pen may still be down" if self._tool == "pen" else "")
 
         which = f"stroke {self.next_stroke} (of {len(self._strokes)}, from 0)"
         return f"{which} is not known to be done; {self.how_to_go_on()} draws the rest"

@@ -63,13 +63,15 @@ async def interrupt(drawing: Drawing, arm: Any, how: str, seconds: float, how_to
         await task
 
     if how != "timeout":
-        assert f"{drawing.how_to_go_on()} draws the rest" in "".join(getattr(caught.value, "__notes__", ()))
+        done = drawing.next_stroke == drawing.progress.of
+        rest = "all strokes are done" if done else f"{drawing.how_to_go_on()} draws the rest"
+        assert rest in "".join(caught.value.__notes__)
 
     return True
 
 
 @pytest.mark.parametrize("how", WAYS_OUT)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_laser_burns_each_way_once_however_often_and_whenever_it_is_interrupted(how: str, seed: int) -> None:
     path, chance = dashes(), random.Random(f"{how} {seed}")
     whole = estimate(path, PLANE, tool="laser").seconds
