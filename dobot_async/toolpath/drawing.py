@@ -47,7 +47,7 @@ __all__ = ["Drawing", "DrawingArm", "draw", "engrave"]
 
 DrawingArm = Magician | UltraArm | MyCobot
 LOOK = 0.5  # seconds between two questions how far the arm is, while commands are sent: each takes the line for a while
-LOCATING = 1.0  # seconds for finding out where a stopped arm was
+LOCATING = 1.5  # seconds after the error, in which an arm has stopped and told where it stands, or is not waited for
 
 
 class Drawing:
@@ -192,12 +192,14 @@ class Drawing:
 
     async def _end(self, error: BaseException, pending: deque[Sent]) -> None:
         """Stop the arm, find out how far it was, and tell it with the error."""
-        cleanup = self._arm.link.cleanup
+        cleanup, deadline = self._arm.link.cleanup, asyncio.get_running_loop().time() + LOCATING
         failure = await cleanup.finish(cleanup.start(self._arm.leave(), "the end of a drawing"))
         self._count(pending)
         # After an alarm nothing tells which of the commands failed that the arm has ticked off.
         if pending and not failure and not isinstance(error, ArmAlarm):
-            await cleanup.finish(cleanup.start(self._locate(pending), "the search where a drawing was stopped"))
+            await cleanup.finish(
+                cleanup.start(self._locate(pending, deadline), "the search where a drawing was stopped")
+            )
 
         error.add_note(self._note())
         if failure:
@@ -211,10 +213,10 @@ class Drawing:
         which = f"stroke {self.next_stroke} (of {len(self._strokes)}, from 0)"
         return f"{which} is not known to be done; {self.how_to_go_on()} draws the rest"
 
-    async def _locate(self, pending: deque[Sent]) -> None:
-        """Find out how far a stopped arm was, within the time that a way out has."""
+    async def _locate(self, pending: deque[Sent], deadline: float) -> None:
+        """Find out how far a stopped arm was, if the way out has left time for it."""
         with suppress(DobotError, TimeoutError):
-            async with asyncio.timeout(LOCATING):
+            async with asyncio.timeout_at(deadline):
                 if stand := await stand_of(self._arm):
                     self._reached(along(pending, stand, self._position))
 

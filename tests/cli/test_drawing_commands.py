@@ -230,8 +230,14 @@ async def test_a_terminal_shows_a_bar(sim: Simulation, cross: str) -> None:
         (["write", "A", *AT, "--height", "5", "--size", "9", "9"], "not both"),
         (["write", "A", *AT, "--height", "0"], "height must be above 0 mm"),
         (["draw", "CROSS", "--at", "300", "0", "-40"], "stroke 0, point 1: (325.0, 40.0, -40.0) is out of reach: "),
-        (["draw", "CROSS", "--at", "150", "-20", "0", "--arm", "ultraarm", "--size", "400", "400"], "y must be in -300 to 300"),
-        (["draw", "CROSS", "--at", "150", "-20", "90", "--arm", "mycobot", "--size", "400", "400"], "y must be in -281.45"),
+        (
+            ["draw", "CROSS", "--at", "150", "-20", "0", "--arm", "ultraarm", "--size", "400", "400"],
+            "y must be in -300 to 300",
+        ),
+        (
+            ["draw", "CROSS", "--at", "150", "-20", "90", "--arm", "mycobot", "--size", "400", "400"],
+            "y must be in -281.45",
+        ),
     ],
     ids=lambda value: " ".join(value)[-60:] if isinstance(value, list) else "",
 )
