@@ -124,6 +124,9 @@ class Bridged(Protocol[F]):
     def requests(self) -> Parser[F]:
         """Returns a parser for what a client sends."""
 
+    def begins(self, data: bytes) -> bool | None:
+        """Returns whether bytes are how a client's first request begins; None while too few of them are there."""
+
     def attach(self, link: Link[F], parser: Parser[F]) -> None:
         """Called with a new link to the arm, and the parser of what it sends."""
 
@@ -165,6 +168,8 @@ class ByKey(ABC, Generic[F]):
     """A family whose answers tell by their keys whose they are, and which has no word for a refusal."""
 
     in_order = False
+    header: bytes
+    """What each frame begins with."""
     stopping: Sequence[F] = ()
 
     @property
@@ -179,6 +184,13 @@ class ByKey(ABC, Generic[F]):
     def requests(self) -> Parser[F]:
         """Returns a parser for what a client sends, which looks like what the arm sends."""
         return self.parser()
+
+    def begins(self, data: bytes) -> bool | None:
+        """Returns whether bytes begin with the header of a frame; None while they are a part of it."""
+        if len(data) < len(self.header):
+            return None if self.header.startswith(data) else False
+
+        return data.startswith(self.header)
 
     def attach(self, link: Link[F], parser: Parser[F]) -> None:
         """The parser needs to know of nothing."""

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import SplitResult
 
 from dobot_async._core.util.tasks import run_shielded
+from dobot_async._core.util.text import printable
 from dobot_async.bridge.limits import Allowance
 from dobot_async.bridge.service import Bridge
 from dobot_async.bridge.telemetry import Telemetry
@@ -256,14 +257,9 @@ def introduction(query: zenoh.Query) -> str | None:
     with suppress(ValueError, AttributeError, RecursionError):
         told = json.loads(payload) if len(payload) <= LONGEST_INTRODUCTION else {}
         if told.get("version") == VERSION:
-            return printable(str(told.get("who", "")))[:LONGEST_NAME]
+            return printable(str(told.get("who", "")), LONGEST_NAME)
 
     return None
-
-
-def printable(text: str) -> str:
-    """What a client calls itself, without anything that a terminal would obey."""
-    return "".join(character if character.isprintable() else "?" for character in text)
 
 
 def read_message(sample: zenoh.Sample) -> tuple[str, bytes]:

@@ -102,6 +102,7 @@ class BridgedMagician(ByKey[Frame]):
     """See `dobot_async.bridged.Bridged`."""
 
     model = "magician"
+    header = f.HEADER
     filler = f.FILLER
     encode = staticmethod(f.request)
     proves_stop = True

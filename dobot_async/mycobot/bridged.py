@@ -83,6 +83,7 @@ class BridgedCobot(ByKey[Frame]):
     """See `dobot_async.bridged.Bridged`; one for each model."""
 
     filler = b""
+    header = f.HEADER
     encode = staticmethod(f.request)
     proves_stop = False
 

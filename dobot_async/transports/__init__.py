@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from importlib import import_module
 from typing import Any, cast
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 from dobot_async.transports.base import Transport
 
 __all__ = ["SCHEMES", "Transport", "hidden", "open_transport"]
 
-TOKEN = re.compile(r"\btoken=[^&]*", re.IGNORECASE)
+USER = re.compile(r"(?<=//)[^/?#]*@")
+SECRET = re.compile(r"token(?!_file$)|password|secret|key", re.IGNORECASE)
+PARTS = re.compile(r"([?&;#]+)")
 SCHEMES = {
     "serial": ("dobot_async.transports.serial", "serial:///dev/ttyUSB0, serial://COM3 (?baud=115200)"),
     "udp": ("dobot_async.transports.network", "udp://192.168.1.20 (port 8899)"),
@@ -43,8 +45,15 @@ async def open_transport(url: str, *, arm: str) -> Transport:
 
 
 def hidden(url: str) -> str:
-    """Returns a URL as it may be shown: without its token."""
-    return TOKEN.sub("token=...", url)
+    """Returns a URL as it may be shown: without its token, however it is written, and without a user's password."""
+    first, *rest = PARTS.split(USER.sub("...@", url))
+    return first + "".join(map(hidden_option, rest))
+
+
+def hidden_option(part: str) -> str:
+    """Returns a part of a query as it may be shown."""
+    name, equals, _ = part.partition("=")
+    return f"{name}=..." if equals and SECRET.search(unquote(name).strip()) else part
 
 
 def module_of(scheme: str) -> Any:

@@ -12,6 +12,7 @@ plain text that the arm says without being asked is a frame of another key, so t
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Hashable
 from dataclasses import asdict
@@ -35,6 +36,8 @@ ANSWER = 1.5  # seconds that an answer to an unknown line may take
 SILENCE = 5.0  # the same for a reading, which may have to wait until somebody else's line was given up
 BEGINS = 0.1  # seconds within which a motion begins
 CALIBRATION = (c.SET_GRIPPER_ZERO, c.SET_GRIPPER_CLOSE_POSITION, c.CALIBRATE_J1, c.SET_SERVO_REGISTER)
+FIRST_WORD = re.compile(rb"\s*[A-Z][ \t]*[-+.\d]", re.IGNORECASE)
+PART_OF_A_WORD = re.compile(rb"\s*([A-Z][ \t]*)?", re.IGNORECASE)
 STOPS = frozenset({c.JOG_STOP, c.RELEASE})
 JOGS = frozenset({c.JOG_JOINT, c.JOG_COORD})
 
@@ -112,6 +115,13 @@ class BridgedUltraArm:
     def requests(self) -> Parser[Line]:
         """Return a parser for a client's stream."""
         return Requests()
+
+    def begins(self, data: bytes) -> bool | None:
+        """Return whether bytes begin with a letter and a number, as all lines do; None while they may yet do so."""
+        if FIRST_WORD.match(data):
+            return True
+
+        return None if PART_OF_A_WORD.fullmatch(data) else False
 
     def attach(self, link: Link[Line], parser: Parser[Line]) -> None:
         """Let the parser know what is asked."""
