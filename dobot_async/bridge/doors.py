@@ -192,7 +192,7 @@ class Datagrams:
         if line.startswith(TOKEN) and end and len(line) <= LONGEST_LINE:
             if authenticator.knows(line.removeprefix(TOKEN)):
                 return rest
-        elif known or (authenticator.token is None and authenticator.begins(data)):
+        elif known or (authenticator.token is None and authenticator.begins(data) is not False):
             return data
 
         reason = "a wrong token, or none" if authenticator.token else "what it says is nothing that this arm is told"

@@ -162,9 +162,10 @@ class PendingConnection(ABC):
     def enter(self) -> Peer:
         """Let it in."""
         self._decided()
-        self.peer = peer = self._handshakes.host.client(
+        peer: Peer = self._handshakes.host.client(
             self.deliver, self.hang_up, ordered=self._ordered, hold=self._hold, name=self.name
         )
+        self.peer = peer
         return peer
 
     def turn_away(self, reason: str) -> None:

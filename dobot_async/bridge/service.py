@@ -244,7 +244,9 @@ class Bridge(Generic[F]):
             self.cut(holder, f"{client.name} has stopped the arm")
 
         client.watch.sent(frame)
-        return await self._line.ask(frame, urgent=True)
+        reply = await self._line.ask(frame, urgent=True)
+        client.watch.answered(frame, reply)
+        return reply
 
     async def _write(self, client: Client[F], request: Request[F]) -> F:
         """Passes on what changes something, once, for the holder of the lease."""

@@ -7,7 +7,7 @@ unanswered; that a stop was heard is found by looking at the arm. The gap betwee
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any
@@ -71,6 +71,10 @@ class CobotWatch:
             return self._told
 
         return self._told and self._model.row(c.IS_MOVING).reply.decode(reply.params)
+
+    def off(self) -> Sequence[Frame]:
+        """Returns nothing: what these arms switch holds, and does not burn or turn."""
+        return ()
 
 
 STOPS = frozenset({c.STOP, c.JOG_STOP})

@@ -91,7 +91,8 @@ async def test_without_an_arm_it_does_not_begin() -> None:
         ("a place to listen", {"listen": []}),
         ("deny", {"deny": ["everything"]}),
         ("on_vanish", {"on_vanish": "wait"}),
-        ("one word", {"token": "two words"}),
+        ("a word of printable ASCII", {"token": "two words"}),
+        ("200 characters at most", {"token": "x" * 201}),
         ("wss needs a certificate", {"listen": "wss://127.0.0.1:0"}),
         ("cannot use the certificate", {"certificate": "/nonexistent"}),
         ("certificate where there is a key", {"key": "/nonexistent"}),
@@ -473,7 +474,7 @@ async def flood(plain: Plain) -> None:
 
 
 async def talk_garbage(plain: Plain) -> None:
-    data = bytes(range(256)) + b"\xaa\xaa\x03" * 100
+    data = b"\xaa\xaa\x03" * 100 + bytes(range(256))
     while True:
         await plain.pour(data)
 
@@ -504,6 +505,7 @@ async def test_who_misbehaves_disturbs_nobody_else(listen: str, misbehave: Any) 
 
 async def test_garbage_without_end_is_cut() -> None:
     async with bridged(limits=Limits(junk=1000)) as rig, client(rig.url) as plain:
+        await plain.ask(c.GET_DEVICE_NAME)
         await plain.transport.send(bytes(2000))
         assert await plain.hung_up()
         assert rig.told("cut") == ["1024 bytes without a request among them"]

@@ -272,7 +272,7 @@ async def test_the_answers_of_one_client_come_in_its_order_refusals_and_stops_in
 
 async def test_bytes_may_be_cut_anywhere_and_noise_between_lines_counts_for_nothing() -> None:
     async with bridged() as rig, plain(rig.bridge.url) as client:
-        for byte in b"\xff\x00m12\r\n\rG92 x200 \r\nM114\r":
+        for byte in b"m12\xff\x00\r\n\rG92 x200 \r\nM114\r":
             await client.send(bytes([byte]))
 
         assert "ANGLES[" in await client.line()
@@ -520,8 +520,18 @@ def test_a_watch_knows_what_moves_and_what_burns() -> None:
     assert not watch.moving(rest)
     watch.sent(Line(b"M21 P200\r"))
     assert watch.moving(rest)
-    watch.sent(Line(b"M21 P0\r"))
+    end(watch, b"M21 P0\r")
+    assert not watch.moving(rest)
     watch.sent(Line(b"M3\r"))
     assert watch.moving(rest)
-    watch.sent(Line(b"M5\r"))
+    end(watch, b"M5\r")
+    assert watch.moving(busy), "it may not have come to that yet"
     assert not watch.moving(rest)
+    watch.sent(Line(b"M15\r"))
+    assert watch.moving(rest), "the stop may have thrown M5 away"
+
+
+def end(watch: UltraArmWatch, line: bytes) -> None:
+    """Something is switched off, which is acknowledged."""
+    watch.sent(Line(line))
+    watch.answered(Line(line), Line(b"ok\r\n"))
