@@ -32,6 +32,7 @@ from dobot_async.bridge.handshake import (
 )
 from dobot_async.bridge.service import Bridge
 from dobot_async.errors import ConnectFailed
+from dobot_async.transports import hidden
 from dobot_async.transports.base import MANY
 from dobot_async.transports.listen import on_tcp, on_udp
 from dobot_async.transports.network import TOKEN as TOKEN_OPTION
@@ -150,10 +151,12 @@ def place_of(listen: str) -> SplitResult:
             return place
 
         known = place.scheme in {"tcp", "udp", "ws", "wss"}
-        if known and place.hostname and place.port is not None and not (place.path.strip("/") or place.query):
+        host = (place.hostname or "").encode("idna")  # a ValueError if nobody can have this name
+        bare = not (place.path.strip("/") or place.query or place.fragment or "@" in place.netloc)
+        if known and host and b"\0" not in host and place.port is not None and bare:
             return place
 
-    raise ValueError(f"cannot listen at {listen!r}; use {FORMS}")
+    raise ValueError(f"cannot listen at {hidden(listen)!r}; use {FORMS}")
 
 
 def local(place: SplitResult) -> bool:

@@ -13,7 +13,7 @@ __all__ = ["SCHEMES", "Transport", "hidden", "open_transport"]
 
 USER = re.compile(r"(?<=//)[^/?#]*@")
 SECRET = re.compile(r"token(?!_file$)|password|secret|key", re.IGNORECASE)
-PARTS = re.compile(r"([?&;#]+)")
+NAME = re.compile(r"[?&;#]([^=?&;#]*)=")
 SCHEMES = {
     "serial": ("dobot_async.transports.serial", "serial:///dev/ttyUSB0, serial://COM3 (?baud=115200)"),
     "udp": ("dobot_async.transports.network", "udp://192.168.1.20 (port 8899)"),
@@ -41,19 +41,21 @@ async def open_transport(url: str, *, arm: str) -> Transport:
         parts = urlsplit(url)
         return cast(Transport, await module_of(parts.scheme).open_url(parts, arm=arm))
     except ValueError as error:
-        raise ValueError(f"{hidden(url)!r}: {error}") from None
+        shown = hidden(url)
+        # What it quotes of the URL may be the secret.
+        reason = "the port is no number" if shown != url and str(error).startswith("Port") else error
+        raise ValueError(f"{shown!r}: {reason}") from None
 
 
 def hidden(url: str) -> str:
     """Returns a URL as it may be shown: without its token, however it is written, and without a user's password."""
-    first, *rest = PARTS.split(USER.sub("...@", url))
-    return first + "".join(map(hidden_option, rest))
+    rest, shown = USER.sub("...@", url), ""
+    while secret := next((found for found in NAME.finditer(rest) if SECRET.search(unquote(found[1]).strip())), None):
+        shown += f"{rest[: secret.end()]}..."
+        _, more, rest = rest[secret.end() :].partition("&")
+        rest = more + rest
 
-
-def hidden_option(part: str) -> str:
-    """Returns a part of a query as it may be shown."""
-    name, equals, _ = part.partition("=")
-    return f"{name}=..." if equals and SECRET.search(unquote(name).strip()) else part
+    return shown + rest
 
 
 def module_of(scheme: str) -> Any:

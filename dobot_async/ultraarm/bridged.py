@@ -224,10 +224,12 @@ class BridgedUltraArm:
         return f"ERROR: {' '.join(reason.split())}\r\n".encode("ascii", "replace")
 
     def check(self, request: Line) -> None:
-        """Raise ProtocolError for what is no line, or holds several commands."""
-        words = words_of(request)
-        row, _ = understood(request)
-        if not words or (row is None and sum(letter in "GM" for letter, _ in words) > 1):
+        """Raise ProtocolError for what is no line, or not just one command with a whole number.
+
+        Whoever reads a line in another way than the arm does cannot say what is denied.
+        """
+        commands = [word[1:] for letter, word in words_of(request) if letter in "GM"]
+        if len(commands) != 1 or not commands[0].isdigit():
             raise ProtocolError("COMMAND NOT RECOGNIZED: expected one command, letters with numbers")
 
 

@@ -480,8 +480,17 @@ def test_what_is_not_wholly_understood_is_a_write(line: bytes, kind: Kind) -> No
     assert BRIDGED.kind(Line(line + b"\r")) is kind
 
 
-@pytest.mark.parametrize("line", [b"%", b"M114 G28", b"N1 G28 M24"])
-def test_lines_of_several_commands_are_refused(line: bytes) -> None:
+@pytest.mark.parametrize("line", [b"M31", b"m031", b"M31.0", b"M31.", b"M+31", b"M 31", b"N5 M31", b"M31X", b"M+031.00 S1"])
+def test_however_a_command_is_written_it_is_denied(line: bytes) -> None:
+    request = Line(line + b"\r")
+    assert BRIDGED.subject(request) in BRIDGED.denials["calibration"]
+    assert BRIDGED.kind(request) is Kind.WRITE
+
+
+@pytest.mark.parametrize(
+    "line", [b"%", b"M114 G28", b"N1 G28 M24", b"M31.9", b"M-31", b"M31 M31", b"M", b"X200", b"(x)M31", b"M31;x"]
+)
+def test_what_is_not_one_command_with_a_whole_number_is_refused(line: bytes) -> None:
     with pytest.raises(ProtocolError):
         BRIDGED.check(Line(line + b"\r"))
 
