@@ -12,6 +12,7 @@ import asyncio
 import ssl
 from collections.abc import Callable
 from contextlib import AsyncExitStack
+from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar, cast
 
 from dobot_async._core.util.tasks import cancel_and_join
@@ -71,18 +72,37 @@ async def on_tcp(
 ) -> str:
     """A TCP port, as a serial server has it; returns its URL, with the scheme that the host makes of it."""
     loop = asyncio.get_running_loop()
-    handshakes: set[Handshake] = set()
-    server = await loop.create_server(lambda: Connection(host, tls, scheme, handshakes), address, port)
+    place = Port(host, tls, scheme)
+    server = await loop.create_server(lambda: Connection(place), address, port)
     stack.push_async_callback(server.wait_closed)
-    stack.push_async_callback(lambda: ended(handshakes))
+    stack.push_async_callback(place.aclose)
     stack.callback(server.close)
     return url_of(f"{scheme}s" if tls and scheme == "ws" else scheme, server.sockets[0].getsockname())
 
 
-async def ended(handshakes: set[Handshake]) -> None:
-    """Ends those whose TLS is not agreed upon yet."""
-    for handshake in list(handshakes):
-        await cancel_and_join(handshake)
+@dataclass(eq=False, slots=True)
+class Port(Generic[P]):
+    """What the connections of one TCP port share.
+
+    Attributes:
+        host: Who is reached.
+        tls: What TLS needs, None for none.
+        scheme: What the URL of a client begins with.
+        handshakes: Those whose TLS is not agreed upon yet.
+        closed: Whether nobody is taken any more, not even who has been accepted already.
+    """
+
+    host: Host[P]
+    tls: ssl.SSLContext | None
+    scheme: str
+    handshakes: set[Handshake] = field(default_factory=set)
+    closed: bool = False
+
+    async def aclose(self) -> None:
+        """Ends those whose TLS is not agreed upon yet."""
+        self.closed = True
+        for handshake in list(self.handshakes):
+            await cancel_and_join(handshake)
 
 
 async def on_udp(
@@ -115,20 +135,12 @@ class Connection(asyncio.Protocol, Generic[P]):
     The host hears of it before TLS is agreed upon, so that who never does it counts as well.
 
     Args:
-        host: Who is reached.
-        tls: What TLS needs, None for none.
-        scheme: What the URL of the client begins with.
-        handshakes: Where the task is kept while TLS is agreed upon.
+        port: Where it has connected.
     """
 
-    def __init__(
-        self, host: Host[P], tls: ssl.SSLContext | None, scheme: str, handshakes: set[Handshake]
-    ) -> None:
+    def __init__(self, port: Port[P]) -> None:
         self._loop = asyncio.get_running_loop()
-        self._host = host
-        self._tls = tls
-        self._scheme = scheme
-        self._handshakes = handshakes
+        self._port = port
         self._handshake: Handshake | None = None
         self._early = bytearray()
         self._lost = False
@@ -136,20 +148,25 @@ class Connection(asyncio.Protocol, Generic[P]):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client has connected."""
         self._transport = cast(asyncio.Transport, transport)
+        if self._port.closed:
+            self._lost = True
+            self._transport.abort()
+            return
+
         self._held = self._full = False
         connection = transport.get_extra_info("socket")
         keep_alive(connection)
         self._watch = PeerWatch(connection, lambda _: self._hang_up())
-        name = url_of(self._scheme, transport.get_extra_info("peername") or ("?", 0))
-        if self._tls:
+        name = url_of(self._port.scheme, transport.get_extra_info("peername") or ("?", 0))
+        if self._port.tls:
             agree = self._loop.start_tls(
-                self._transport, self, self._tls, server_side=True, ssl_handshake_timeout=TLS_WITHIN
+                self._transport, self, self._port.tls, server_side=True, ssl_handshake_timeout=TLS_WITHIN
             )
             self._handshake = self._loop.create_task(agree, name=f"dobot_async TLS with {name}")
             self._handshake.add_done_callback(self._agreed)
-            self._handshakes.add(self._handshake)
+            self._port.handshakes.add(self._handshake)
 
-        self._client = self._host.client(self._write, self._hang_up, ordered=True, hold=self._hold, name=name)
+        self._client = self._port.host.client(self._write, self._hang_up, ordered=True, hold=self._hold, name=name)
 
     def data_received(self, data: bytes) -> None:
         """It has sent something."""
@@ -173,11 +190,11 @@ class Connection(asyncio.Protocol, Generic[P]):
         if not self._lost:
             self._lost = True
             self._watch.stop()
-            self._host.leave(self._client)
+            self._port.host.leave(self._client)
 
     def _agreed(self, handshake: Handshake) -> None:
         """Go on with what stands in place of the plain connection when TLS is agreed upon; else end it."""
-        self._handshakes.discard(handshake)
+        self._port.handshakes.discard(handshake)
         self._handshake = None
         error = None if handshake.cancelled() else handshake.exception()
         secure = None if handshake.cancelled() or error else handshake.result()
