@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from dobot_async.cli.credentials import own_token
 from dobot_async.cli.session import Session, run
 
 __all__ = ["FILE", "GROUPS", "bridge", "serve"]
@@ -48,19 +49,7 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
     if session.trace:
         raise click.UsageError("a bridge writes no trace: passwords go through it; trace the program that connects")
 
-    if token_file:
-        token = token_in(token_file)
-
-    run(serve(session, token=token, **details))
-
-
-def token_in(file: Path) -> str:
-    """Returns the token in a file; raises UsageError if there is none."""
-    token = file.read_bytes().strip()
-    if not token.isascii() or not token:
-        raise click.UsageError(f"{file} has no token: one word of printable ASCII characters")
-
-    return token.decode("ascii")
+    run(serve(session, token=own_token(token, token_file), **details))
 
 
 async def serve(session: Session, *, source: str, token: str | None, **details: Any) -> None:

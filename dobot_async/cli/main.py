@@ -21,6 +21,7 @@ import click
 from dobot_async.cli.bridge import bridge
 from dobot_async.cli.cell import cell
 from dobot_async.cli.commands import COMMANDS
+from dobot_async.cli.credentials import token_file_option
 from dobot_async.cli.decode import decode
 from dobot_async.cli.demo import demo
 from dobot_async.cli.discover import discover_arms
@@ -71,6 +72,7 @@ class Group(click.Group):
     help="Where the arm is: serial:///dev/ttyUSB0, serial://COM3, udp://192.168.1.20, tcp://host:port, ble: or sim: "
     "(a simulated one). Default: DOBOT_URL.",
 )
+@token_file_option
 @click.option("--arm", type=click.Choice(list(ARMS)), default="magician", show_default=True, help="Which arm it is.")
 @click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object on standard output.")
 @click.option(

@@ -17,6 +17,7 @@ from typing import Any, Literal, TypeVar
 import click
 
 from dobot_async._core.link.link import Link
+from dobot_async.cli.credentials import with_token
 from dobot_async.cli.families import FAMILIES, Family
 from dobot_async.cli.output import Output
 from dobot_async.cli.trace import Trace, tracing
@@ -101,7 +102,7 @@ class Session:
         on_error: Literal["stop", "leave"] = "stop",
     ) -> AsyncIterator[Any]:
         """Connects to the session's arm, or to a URL, with the trace that was asked for."""
-        url = url or self.url
+        url = url or (self.url and with_token(self.url))
         if not url:
             forms = "; ".join(form for _, form in SCHEMES.values())
             raise click.UsageError(f"which arm? Give --url or set DOBOT_URL, to one of: {forms}")
