@@ -29,7 +29,12 @@ class WebSocketConnection(PendingConnection):
     """A WebSocket connection, from its HTTP request on."""
 
     def __init__(
-        self, handshakes: Handshakes, deliver: Callable[[bytes], None], hang_up: Callable[[], None], *rest: Any, **more: Any
+        self,
+        handshakes: Handshakes,
+        deliver: Callable[[bytes], None],
+        hang_up: Callable[[], None],
+        *rest: Any,
+        **more: Any,
     ) -> None:
         super().__init__(handshakes, deliver, hang_up, *rest, **more)
         library = websockets("server")

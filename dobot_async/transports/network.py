@@ -80,7 +80,9 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 
     host = url.hostname
     port = UDP_PORT if url.scheme == "udp" and url.port is None else url.port
     if not host or not port or url.path.strip("/") or "@" in url.netloc:
-        raise ValueError(f"expected {'udp://host' if url.scheme == 'udp' else 'tcp://host:port'}, and ?token= for a token")
+        raise ValueError(
+            f"expected {'udp://host' if url.scheme == 'udp' else 'tcp://host:port'}, and ?token= for a token"
+        )
 
     try:
         return await (reach_udp if url.scheme == "udp" else reach_tcp)(host, port, token=token, **given)

@@ -89,7 +89,16 @@ async def flood(name: str, arguments: argparse.Namespace, folder: Path) -> bool:
     authority.issue_cert("127.0.0.1").private_key_and_cert_chain_pem.write_to_path(folder / "server.pem")
     listen, *tls = PORTS[name]
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "dobot_async", "bridge", "sim:", listen, *tls, *[str(folder / "server.pem")][: len(tls)]),
+        *(
+            sys.executable,
+            "-m",
+            "dobot_async",
+            "bridge",
+            "sim:",
+            listen,
+            *tls,
+            *[str(folder / "server.pem")][: len(tls)],
+        ),
         stdout=PIPE,
         stderr=STDOUT,
         env={**os.environ, "DOBOT_BRIDGE_TOKEN": TOKEN},

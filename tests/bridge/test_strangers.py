@@ -193,7 +193,11 @@ async def test_a_token_that_nobody_asked_for_is_taken_and_does_not_reach_the_arm
 
 @pytest.mark.parametrize(
     ("listen", "origin"),
-    [(WS, b"Origin: https://\xff\r\n"), (WS, b"Origin: https://\x1b[31m\r\n"), (WS, b"Origin: https://" + b"a" * 4000 + b"\r\n")],
+    [
+        (WS, b"Origin: https://\xff\r\n"),
+        (WS, b"Origin: https://\x1b[31m\r\n"),
+        (WS, b"Origin: https://" + b"a" * 4000 + b"\r\n"),
+    ],
 )
 async def test_whatever_strangers_say_is_made_printable(
     listen: str, origin: bytes, caplog: pytest.LogCaptureFixture
@@ -298,5 +302,3 @@ def test_any_text_is_made_printable(text: str) -> None:
     assert shown.isprintable()
     if text.isascii() and text.isprintable() and len(text) <= LONGEST:
         assert shown == text
-
-

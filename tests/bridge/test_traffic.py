@@ -123,9 +123,7 @@ def test_other_arms_are_served_as_well(family: str, what: str) -> None:
 async def test_ways_that_know_no_virtual_clock_serve_as_well() -> None:
     places = ["pty", "udp://127.0.0.1:0", f"zenoh://left?listen={endpoint()}"]
     async with AsyncExitStack() as stack:
-        sims = [
-            await stack.enter_async_context(simulate(listen="tcp://127.0.0.1:0", seed=3, speed=20)) for _ in places
-        ]
+        sims = [await stack.enter_async_context(simulate(listen="tcp://127.0.0.1:0", seed=3, speed=20)) for _ in places]
         running = [
             await stack.enter_async_context(through_a_bridge(sim, "magician", 5, listen))
             for sim, listen in zip(sims, places, strict=True)

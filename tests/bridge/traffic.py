@@ -49,7 +49,9 @@ class Kind:
 
 
 FAMILIES = {
-    "magician": Kind(Magician.connect, lambda arm: arm.get_pose(), lambda arm, back: arm.move_to(200 + 20 * back, 0, 40)),
+    "magician": Kind(
+        Magician.connect, lambda arm: arm.get_pose(), lambda arm, back: arm.move_to(200 + 20 * back, 0, 40)
+    ),
     "mycobot280": Kind(
         MyCobot.connect, lambda arm: arm.get_angles(), lambda arm, back: arm.move_joints(10 + 20 * back, 0, 0, 0, 0, 0)
     ),
@@ -185,7 +187,10 @@ def memory() -> float:
 
 async def measure(name: str, way: Any, arguments: argparse.Namespace) -> Figures:
     """Runs one way for the whole time."""
-    async with simulate(arguments.family, listen="tcp://127.0.0.1:0", seed=5, speed=20) as sim, AsyncExitStack() as stack:
+    async with (
+        simulate(arguments.family, listen="tcp://127.0.0.1:0", seed=5, speed=20) as sim,
+        AsyncExitStack() as stack,
+    ):
         sim.faults.latency = 0.002
         programs: Programs = await stack.enter_async_context(way(sim))
         await asyncio.sleep(1)
@@ -198,7 +203,9 @@ async def measure(name: str, way: Any, arguments: argparse.Namespace) -> Figures
             now = time.monotonic()
             new = [answered for _, answered in figures.reads[told:]]
             told = len(figures.reads)
-            line = f"{sum(new) / (now - last):6.1f} answers/s, {new.count(False):3} unanswered, {figures.moves:6} motions"
+            line = (
+                f"{sum(new) / (now - last):6.1f} answers/s, {new.count(False):3} unanswered, {figures.moves:6} motions"
+            )
             sys.stdout.write(f"{name:8} {now - began:5.0f} s: {line}, {memory():5.1f} MB, {dict(figures.failures)}\n")
             sys.stdout.flush()
             last = now

@@ -92,5 +92,3 @@ def test_a_bridge_is_told_one_token_or_none(
     done: Any = CliRunner(env=environment).invoke(cli, ["bridge", "sim:", "tcp://127.0.0.1:0", *given])
     assert done.exit_code == 2
     assert message in done.stderr
-
-

@@ -480,7 +480,9 @@ def test_what_is_not_wholly_understood_is_a_write(line: bytes, kind: Kind) -> No
     assert BRIDGED.kind(Line(line + b"\r")) is kind
 
 
-@pytest.mark.parametrize("line", [b"M31", b"m031", b"M31.0", b"M31.", b"M+31", b"M 31", b"N5 M31", b"M31X", b"M+031.00 S1"])
+@pytest.mark.parametrize(
+    "line", [b"M31", b"m031", b"M31.0", b"M31.", b"M+31", b"M 31", b"N5 M31", b"M31X", b"M+031.00 S1"]
+)
 def test_however_a_command_is_written_it_is_denied(line: bytes) -> None:
     request = Line(line + b"\r")
     assert BRIDGED.subject(request) in BRIDGED.denials["calibration"]
