@@ -50,8 +50,8 @@ FAREWELL = 1.5  # seconds: with the closing of the link that is 2, for who is ca
 class BridgeEvent:
     """What happened at a bridge, in printable ASCII whatever strangers have said.
 
-    A kind of event that strangers can cause is told 40 times at once, then once or twice a second; the next one says how
-    many were left out.
+    A kind of event that strangers can cause is told 40 times at once, then once or twice a second; the next one says
+    how many were left out.
 
     Attributes:
         what: "connected", "left", "turned away", "cut", "refused", "lease", "released", "stopped", "link".

@@ -118,7 +118,7 @@ class Door:
             others = await self._others()
 
         if others:
-            self._token.undeclare()
+            self._token.undeclare()  # type: ignore[no-untyped-call]
             raise ConnectFailed(self._taken())
 
     async def aclose(self) -> None:

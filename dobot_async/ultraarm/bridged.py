@@ -69,7 +69,7 @@ class UltraArmWatch:
             self._told = True
             self._begins_by = self._clock() + BEGINS
 
-    def answered(self, request: Line, reply: Line) -> None:
+    def answered(self, request: Line, reply: Line) -> None:  # noqa: ARG002 - whatever it was
         """It was answered, which does not say that it is done; but an "off" is in the queue."""
         row, value = understood(request)
         switch = SWITCHED.get(row) if row else None

@@ -3,8 +3,8 @@
     python tests/bridge/flood.py [--connections 1100] [--seconds 30]
 
 The bridge is a process of its own, with room for 1024 files as systems have it. The connections go to this computer's
-loopback interface, are closed in the end, and say nothing. Each port has to keep below 80 MB and 200 lines a minute, and
-to let a client in within 6 s.
+loopback interface, are closed in the end, and say nothing. Each port has to keep below 80 MB and 200 lines a minute,
+and to let a client in within 6 s.
 """
 
 from __future__ import annotations
@@ -135,8 +135,8 @@ async def flood(name: str, arguments: argparse.Namespace, folder: Path) -> bool:
     rate = lines / max(minutes, 1)
     fine = most < MEGABYTES and rate < LINES and worst < SECONDS
     sys.stdout.write(
-        f"{name:9} {len(opened)} connections: {most:5.1f} MB, {rate:5.0f} lines a minute, a client in after {worst:.2f} s "
-        f"({before:.2f} s before): {'fine' if fine else 'TOO MUCH'}\n"
+        f"{name:9} {len(opened)} connections: {most:5.1f} MB, {rate:5.0f} lines a minute, "
+        f"a client in after {worst:.2f} s ({before:.2f} s before): {'fine' if fine else 'TOO MUCH'}\n"
     )
     sys.stdout.flush()
     return fine

@@ -74,25 +74,24 @@ async def answer_to(url: str, data: bytes) -> bytes:
 @pytest.mark.parametrize("tls", [False, True], ids=["plain", "tls"])
 @pytest.mark.parametrize("listen", [TCP, WS])
 async def test_who_says_nothing_is_one_of_a_few_and_keeps_nobody_out(listen: str, tls: bool) -> None:
-    async with bridged(listen, token=TOKEN, certificate=PEM if tls else None) as rig:
-        async with silent(rig.url.replace("localhost", "127.0.0.1"), 3 * PENDING):
-            await until(lambda: len(rig.told("turned away")) >= min(2 * PENDING, 40))
-            trust = f"&ca={PEM}" if tls else ""
-            url = rig.url.replace("127.0.0.1", "localhost") if tls else rig.url
-            async with Magician.connect(f"{url}?token={TOKEN}{trust}", control=False) as arm:
-                assert await arm.get_pose()
+    served = bridged(listen, token=TOKEN, certificate=PEM if tls else None)
+    async with served as rig, silent(rig.url, 3 * PENDING):
+        await until(lambda: len(rig.told("turned away")) >= min(2 * PENDING, 40))
+        trust = f"&ca={PEM}" if tls else ""
+        url = rig.url.replace("127.0.0.1", "localhost") if tls else rig.url
+        async with Magician.connect(f"{url}?token={TOKEN}{trust}", control=False) as arm:
+            assert await arm.get_pose()
 
 
 async def test_without_a_token_it_is_the_same() -> None:
-    async with bridged() as rig, silent(rig.url, PENDING) as first:
-        async with silent(rig.url, PENDING + 10):
-            for each in first:
-                with suppress(ConnectionResetError):
-                    assert await asyncio.get_running_loop().sock_recv(each, 1) == b""
+    async with bridged() as rig, silent(rig.url, PENDING) as first, silent(rig.url, PENDING + 10):
+        for each in first:
+            with suppress(ConnectionResetError):
+                assert await asyncio.get_running_loop().sock_recv(each, 1) == b""
 
-            assert set(rig.told("turned away")) == {"too many others want to come in"}
-            async with client(rig.url) as plain:
-                assert await plain.ask(c.GET_POSE)
+        assert set(rig.told("turned away")) == {"too many others want to come in"}
+        async with client(rig.url) as plain:
+            assert await plain.ask(c.GET_POSE)
 
 
 @pytest.mark.parametrize("tls", [False, True], ids=["plain", "tls"])
@@ -114,10 +113,9 @@ async def test_tls_has_not_long_either_where_there_is_no_token(monkeypatch: pyte
 
 
 async def test_a_bridge_ends_while_somebody_agrees_upon_tls() -> None:
-    async with AsyncExitStack() as stack:
-        async with bridged(certificate=PEM, token=TOKEN) as rig:
-            await stack.enter_async_context(silent(rig.url, 3))
-            await until(lambda: any("TLS" in task.get_name() for task in asyncio.all_tasks()))
+    async with AsyncExitStack() as strangers, bridged(certificate=PEM, token=TOKEN) as rig:
+        await strangers.enter_async_context(silent(rig.url, 3))
+        await until(lambda: any("TLS" in task.get_name() for task in asyncio.all_tasks()))
 
     assert not [task for task in asyncio.all_tasks() if "TLS" in task.get_name()]
 

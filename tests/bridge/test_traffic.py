@@ -8,6 +8,7 @@ from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from functools import partial
 
 import pytest
+from bridge_rig import until
 from traffic import Figures, Programs, bare, through_a_bridge
 from virtual import run_virtual
 from virtual_ports import virtual_ports
@@ -130,9 +131,9 @@ async def test_ways_that_know_no_virtual_clock_serve_as_well() -> None:
         ]
         await asyncio.gather(*(trouble(sim, "loss", 0.7) for sim in sims))
         marks = [len(each.figures.reads) for each in running]
-        while any(len(each.figures.reads) < mark + 60 for each, mark in zip(running, marks, strict=True)):
-            await asyncio.sleep(0.05)
-
+        await until(
+            lambda: all(len(each.figures.reads) >= mark + 60 for each, mark in zip(running, marks, strict=True))
+        )
         for each, mark in zip(running, marks, strict=True):
             assert sum(answered for _, answered in each.figures.reads[:mark]) >= WORST * mark
             assert all(answered for _, answered in each.figures.reads[mark + 25 :])

@@ -153,7 +153,7 @@ async def test_a_watcher_cannot_pass_for_an_arm_and_lock_out_who_may_move_it() -
             await moves(f"zenoh://left?config=access-client.json5&connect={where}", rig)
             assert not overheard
             for token in tokens:
-                token.undeclare()
+                token.undeclare()  # type: ignore[no-untyped-call]
 
 
 async def arms(own: zenoh.Session) -> list[str]:

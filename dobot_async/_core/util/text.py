@@ -9,10 +9,10 @@ LONGEST = 200
 
 
 def printable(text: str, longest: int = LONGEST) -> str:
-    """Return a text in printable ASCII on one line, whatever somebody has put into it.
+    r"""Return a text in printable ASCII on one line, whatever somebody has put into it.
 
     Control characters, letters that only some terminals have, and what no encoding can write become escapes such as
-    `\\x1b` and `\\u202e`, so that writing it down cannot fail and obeys nothing.
+    `\x1b` and `\u202e`, so that writing it down cannot fail and obeys nothing.
 
     Args:
         text: Any text.
