@@ -6,7 +6,7 @@ unanswered; that a stop was heard is found by looking at the arm. The gap betwee
 
 from __future__ import annotations
 
-import time
+import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
@@ -42,7 +42,7 @@ CALIBRATION = (
 class CobotWatch:
     """What one program has made the arm do: it moves while the arm says so, and for a while after the last motion."""
 
-    def __init__(self, model: CobotModel, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, model: CobotModel, clock: Callable[[], float]) -> None:
         self.question = request(model, c.IS_MOVING)
         self._model = model
         self._clock = clock
@@ -115,7 +115,7 @@ class BridgedCobot(ByKey[Frame]):
 
     def watch(self) -> CobotWatch:
         """Returns what follows one program."""
-        return CobotWatch(self._model)
+        return CobotWatch(self._model, asyncio.get_running_loop().time)
 
     def kind(self, request: Frame) -> Kind:
         """Returns what a request is."""

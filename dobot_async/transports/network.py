@@ -73,7 +73,8 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 
     """Open `udp://host[:8899]` or `tcp://host:port`.
 
     Both take `?token=` or `?token_file=`, which a bridge asks for. `?reorder_window=` says if a network is worse than
-    `REORDER_WINDOW`; `?ca=` turns TLS on: a PEM file with the certificate to trust, or "system" for those that the computer trusts.
+    `REORDER_WINDOW`; `?ca=` turns TLS on: a PEM file with the certificate to trust, or "system" for those that the
+    computer trusts.
     """
     given = options(url, OPTIONS[url.scheme])
     token = token_of(given)

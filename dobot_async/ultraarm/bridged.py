@@ -11,9 +11,9 @@ plain text that the arm says without being asked is a frame of another key, so t
 
 from __future__ import annotations
 
+import asyncio
 import math
 import re
-import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -48,7 +48,7 @@ class UltraArmWatch:
     Laser and PWM wait in the queue as motions do, and a stop may throw them away: see `Switch`.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, clock: Callable[[], float]) -> None:
         self.question = question(c.GET_STATUS)
         self._clock = clock
         self._told = False
@@ -166,7 +166,7 @@ class BridgedUltraArm:
 
     def watch(self) -> UltraArmWatch:
         """Return what follows one program."""
-        return UltraArmWatch()
+        return UltraArmWatch(asyncio.get_running_loop().time)
 
     def kind(self, request: Line) -> Kind:
         """Return what a request is; a line that is not wholly understood is a write."""

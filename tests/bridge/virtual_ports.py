@@ -9,7 +9,7 @@ import async_solipsism.loop
 import async_solipsism.socket
 import pytest
 
-__all__ = ["virtual_ports"]
+__all__ = ["on_the_virtual_clock", "virtual_ports"]
 
 
 async def numeric(_: Any, host: str, port: int, **more: Any) -> list[Any]:
@@ -28,3 +28,8 @@ def virtual_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(async_solipsism.loop.EventLoop, "getaddrinfo", numeric)
     for verb in ("getsockopt", "setsockopt"):
         monkeypatch.setattr(async_solipsism.socket.Socket, verb, no_option, raising=False)
+
+
+def on_the_virtual_clock(test: Any) -> Any:
+    """Marks a test that listens at, and connects to, nothing but tcp and ws ports of its own loop."""
+    return pytest.mark.virtual_time(pytest.mark.usefixtures("virtual_ports")(test))
