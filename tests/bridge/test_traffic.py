@@ -107,7 +107,7 @@ def test_a_magician_is_served_as_well_as_by_the_bare_line(what: str) -> None:
 
 
 @pytest.mark.usefixtures("virtual_ports")
-@pytest.mark.parametrize(("listen", "programs"), [("ws://127.0.0.1:0", 5), ("tcp://127.0.0.1:0", 20)])
+@pytest.mark.parametrize(("listen", "programs"), [("ws://127.0.0.1:0", 5), ("tcp://127.0.0.1:0", 15)])
 def test_by_whichever_way_and_however_many_they_are(listen: str, programs: int) -> None:
     own = seen(bare, "magician", "loss", programs)
     assert_as_good(seen(partial(through_a_bridge, listen=listen), "magician", "loss", programs), own)
