@@ -2,8 +2,8 @@
 
     python tests/bridge/traffic.py [--minutes 10] [--programs 5] [--loss 0.003] [--corrupt 0.002] [--listen tcp ...]
 
-It compares a bridge, by each way in, with one program that does the same on the arm's line by itself, in real time, and
-prints a line every half minute: answers and failures, the memory of the process, and what the line had to repeat.
+It compares a bridge, by each way in, with one program that does the same on the arm's line by itself, in real time and
+at the same time, each with an arm of its own. It prints a line every half minute: answers, failures, and the memory.
 """
 
 from __future__ import annotations
@@ -162,12 +162,16 @@ async def bare(sim: Simulation, family: str, programs: int, *, moves: bool = Tru
 async def through_a_bridge(
     sim: Simulation, family: str, programs: int, listen: str = "tcp://127.0.0.1:0", *, moves: bool = True
 ) -> AsyncIterator[Programs]:
-    """A program for each, by way of a bridge; with `moves` the last one moves the arm."""
+    """A program for each, by way of a bridge; with `moves` the last one moves the arm.
+
+    A pseudo-terminal is for one program, the last one; the others come by tcp.
+    """
     running = Programs(family, Figures())
     details = {"model": family} if family.startswith("my") else {}
-    async with bridge(sim.url, listen=listen, family=family, timeout=10) as served:
+    ways = [listen, "tcp://127.0.0.1:0"] if listen == "pty" else [listen]
+    async with bridge(sim.url, listen=ways, family=family, timeout=10) as served:
         for _ in range(programs - 1):
-            running.start(running.program(served.url, running.read, control=False, **details))
+            running.start(running.program(served.urls[-1], running.read, control=False, **details))
 
         running.start(running.program(served.url, running.move if moves else running.read, control=moves, **details))
         try:
@@ -185,55 +189,68 @@ def memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
 
 
-async def measure(name: str, way: Any, arguments: argparse.Namespace) -> Figures:
+@dataclass(slots=True)
+class Total:
+    """What came of one way.
+
+    Attributes:
+        answered: Reads that were answered.
+        unanswered: Reads that were not.
+        lost: How often a program lost its connection.
+    """
+
+    answered: int = 0
+    unanswered: int = 0
+    lost: int = 0
+
+
+async def measure(name: str, way: Any, arguments: argparse.Namespace) -> Total:
     """Runs one way for the whole time."""
-    async with (
-        simulate(arguments.family, listen="tcp://127.0.0.1:0", seed=5, speed=20) as sim,
-        AsyncExitStack() as stack,
-    ):
+    total = Total()
+    async with AsyncExitStack() as stack:
+        sim = await stack.enter_async_context(simulate(arguments.family, listen="tcp://127.0.0.1:0", seed=5, speed=20))
         sim.faults.latency = 0.002
         programs: Programs = await stack.enter_async_context(way(sim))
+        figures = programs.figures
         await asyncio.sleep(1)
         sim.faults.loss, sim.faults.corrupt = arguments.loss, arguments.corrupt
         began = last = time.monotonic()
-        told = 0
         while (left := began + arguments.minutes * 60 - time.monotonic()) > 0:
             await asyncio.sleep(min(30, left))
-            figures = programs.figures
             now = time.monotonic()
-            new = [answered for _, answered in figures.reads[told:]]
-            told = len(figures.reads)
-            line = (
-                f"{sum(new) / (now - last):6.1f} answers/s, {new.count(False):3} unanswered, {figures.moves:6} motions"
+            answered = sum(each for _, each in figures.reads)
+            total.answered += answered
+            total.unanswered += len(figures.reads) - answered
+            total.lost = figures.failures["ConnectionLost"]
+            line = f"{answered / (now - last):6.1f} answers/s, {len(figures.reads) - answered:3} unanswered"
+            sys.stdout.write(
+                f"{name:8} {now - began:5.0f} s: {line}, {figures.moves:6} motions, {dict(figures.failures)}, "
+                f"{memory():5.1f} MB in all\n"
             )
-            sys.stdout.write(f"{name:8} {now - began:5.0f} s: {line}, {memory():5.1f} MB, {dict(figures.failures)}\n")
             sys.stdout.flush()
+            figures.reads.clear()
             last = now
 
-        return programs.figures
+    return total
 
 
 async def main(arguments: argparse.Namespace) -> int:
-    """Measures the bare line, then each way in; returns how many of them fall short."""
-    seconds = arguments.minutes * 60
-    own = await measure("bare", lambda sim: bare(sim, arguments.family, arguments.programs), arguments)
-    answers = sum(answered for _, answered in own.reads) / seconds
+    """Measures the bare line and each way in, all at the same time; returns how many of them fall short."""
+
+    def way_in(listen: str) -> Any:
+        place = f"{listen}://127.0.0.1:0" if listen in {"tcp", "udp", "ws"} else listen
+        return lambda sim: through_a_bridge(sim, arguments.family, arguments.programs, place)
+
+    ways = {"bare": lambda sim: bare(sim, arguments.family, arguments.programs)}
+    ways |= {listen.partition(":")[0]: way_in(listen) for listen in arguments.listen}
+    own, *others = await asyncio.gather(*(measure(name, way, arguments) for name, way in ways.items()))
     short = 0
-    for listen in arguments.listen:
-        before = memory()
-        way = f"{listen}://127.0.0.1:0" if listen in {"tcp", "udp", "ws"} else listen
-        found = await measure(
-            listen.partition(":")[0],
-            lambda sim, way=way: through_a_bridge(sim, arguments.family, arguments.programs, way),
-            arguments,
-        )
-        share = sum(answered for _, answered in found.reads) / seconds / answers
-        fine = share >= 0.95 and not found.failures["ConnectionLost"]
+    for listen, found in zip(arguments.listen, others, strict=True):
+        share = found.answered / own.answered
+        fine = share >= 0.95 and not found.lost
         short += not fine
-        sys.stdout.write(
-            f"{listen}: {share:.1%} of the bare line's answers, {found.failures['ConnectionLost']} ConnectionLost, "
-            f"{memory() - before:+.1f} MB: {'fine' if fine else 'TOO LITTLE'}\n"
-        )
+        verdict = "fine" if fine else "TOO LITTLE"
+        sys.stdout.write(f"{listen}: {share:.1%} of the bare line's answers, {found.lost} ConnectionLost: {verdict}\n")
 
     return short
 
