@@ -211,13 +211,13 @@ class Door:
     def _heard(self, message: tuple[str, bytes]) -> None:
         """A client has sent something; who is none any more, or not yet, is told so.
 
-        Nobody else is answered: a name with a wildcard would be all clients at once.
+        A name with a wildcard is not answered: it would be all clients at once.
         """
         name, data = message
         guest = self._guests.get(name)
         if guest:
             guest.send(data)
-        elif name in self._present and self._may_tell():
+        elif CHUNK.fullmatch(name) and self._may_tell():
             with suppress(library().ZError):
                 self.way(name, waits=False)(Numbered().pack(b"its connection has ended", END))
 
