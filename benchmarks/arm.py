@@ -38,7 +38,8 @@ __all__ = ["AT_ONCE", "Arms", "arms", "crowd"]
 AT_ONCE = 1e6
 """The speed of an arm that executes at once."""
 QUIRKS: dict[str, dict[str, Any]] = {
-    "myarm300": {"quirks": MyCobotQuirks(acknowledges=frozenset({cobot.SEND_ANGLES}), echo=False, transponder=False)}
+    "myarm300": {"quirks": MyCobotQuirks(acknowledges=frozenset({cobot.SEND_ANGLES}), echo=False, transponder=False)},
+    "ultraarm": {"homed": True},
 }
 """A newer myArm acknowledges motions, and the vendor's library waits for that. A frame that comes byte by byte, as over
 a real line, must not count as one in pieces."""

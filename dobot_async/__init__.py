@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import Any
 
 HOMES = {
+    "arms.info": ("DeviceInfo",),
     "contract": ("LinkState", "LinkStats", "Unexpected"),
     "discovery": ("DiscoveryProblem", "Found", "discover"),
     "errors": (
@@ -21,6 +22,7 @@ HOMES = {
         "MotionUnknown",
         "ProtocolError",
         "ReplyTimeout",
+        "UnsupportedError",
     ),
     "fleet.fleet": ("Fleet",),
     "_core.link.link": ("Link",),

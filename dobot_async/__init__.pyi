@@ -2,6 +2,7 @@
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.queue.motion import Motion
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.contract import LinkState, LinkStats, Unexpected
 from dobot_async.discovery import DiscoveryProblem, Found, discover
 from dobot_async.errors import (
@@ -14,13 +15,17 @@ from dobot_async.errors import (
     MotionUnknown,
     ProtocolError,
     ReplyTimeout,
+    UnsupportedError,
 )
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.magician.alarms import Alarm
-from dobot_async.magician.arm import DeviceInfo, Jog, Magician
+from dobot_async.magician.arm import Magician
 from dobot_async.magician.effectors import Gripper, Laser, Pen, SuctionCup
+from dobot_async.magician.jogs import Jog
 from dobot_async.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.magician.params import (
+    AccessoryVersion,
+    Color,
     ColorPort,
     EndEffectorParams,
     HHTTrigMode,
@@ -34,19 +39,22 @@ from dobot_async.mycobot.alarms import CobotAlarm
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.models import CobotModel
 from dobot_async.mycobot.params import Coords, EndType, GripperType, MoveMode, PinMode, ReferenceFrame
-from dobot_async.mycobot.readings import CobotInfo, CobotPose
+from dobot_async.mycobot.pose import CobotPose
+from dobot_async.mycobot.readings import CobotInfo
 from dobot_async.transports import open_transport
 from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
-from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits
+from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits, UltraArmPose
 from dobot_async.wire import Command
 
 __all__ = [
+    "AccessoryVersion",
     "Alarm",
     "ArmAlarm",
     "CobotAlarm",
     "CobotInfo",
     "CobotModel",
     "CobotPose",
+    "Color",
     "ColorPort",
     "Command",
     "CommandRejected",
@@ -92,8 +100,10 @@ __all__ = [
     "UltraArmCoords",
     "UltraArmJog",
     "UltraArmLimits",
+    "UltraArmPose",
     "Unexpected",
     "Unreachable",
+    "UnsupportedError",
     "discover",
     "open_transport",
 ]

@@ -29,7 +29,9 @@ class Kind(enum.Enum):
     WRITE = "write"
     """Changes something, or moves the arm; one program at a time may send it."""
     STOP = "stop"
-    """Makes the arm stop; anybody may send it, and it goes ahead of everything."""
+    """Makes the arm stop; anybody may send it, and it goes ahead of everything. What waits to be written is dropped."""
+    OFF = "off"
+    """Switches off what burns or turns; anybody may send it, and it goes ahead of everything. Nothing else changes."""
 
 
 class Watch(Protocol[F]):

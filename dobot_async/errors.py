@@ -8,7 +8,8 @@
     ├── CommandRejected                      the arm answered that it will not do it
     ├── ArmAlarm                             the arm ended the motion with alarms
     ├── MotionStopped                        a stop or a clear ended the motion
-    └── MotionUnknown                        the motion may or may not run
+    ├── MotionUnknown                        the motion may or may not run
+    └── UnsupportedError                     the arm has no such thing, or its protocol does not give it
 
 Wrong arguments are `ValueError` or `TypeError` and are raised before a byte is sent.
 """
@@ -29,6 +30,7 @@ __all__ = [
     "MotionUnknown",
     "ProtocolError",
     "ReplyTimeout",
+    "UnsupportedError",
     "another",
 ]
 
@@ -36,7 +38,14 @@ E = TypeVar("E", bound=BaseException)
 
 
 class DobotError(Exception):
-    """The root of everything that an arm or its link can do wrong."""
+    """The root of everything that an arm or its link can do wrong.
+
+    Attributes:
+        steps: Of `queue.stream`: the first and the last step that may have failed, both the same where it is known
+            which; () for everything else.
+    """
+
+    steps: tuple[Any, ...] = ()
 
 
 class ConnectFailed(DobotError, ConnectionError):
@@ -64,11 +73,14 @@ class ArmAlarm(DobotError):
 
     Attributes:
         alarms: What is set, each with its code, cause and remedy.
+        motions: Of a queue, in order: the first motion that is not known to be done, up to the last that may have
+            failed.
     """
 
-    def __init__(self, message: str, alarms: Sequence[Any] = ()) -> None:
+    def __init__(self, message: str, alarms: Sequence[Any] = (), motions: Sequence[Any] = ()) -> None:
         super().__init__(message)
         self.alarms = tuple(alarms)
+        self.motions = tuple(motions)
 
 
 class MotionStopped(DobotError):
@@ -77,6 +89,10 @@ class MotionStopped(DobotError):
 
 class MotionUnknown(DobotError):
     """Nothing can tell whether the motion runs; the arm was told to stop."""
+
+
+class UnsupportedError(DobotError):
+    """The arm has no such thing, or its protocol does not give it."""
 
 
 def another(error: E) -> E:

@@ -39,6 +39,7 @@ class Family:
         discovery: A `dobot_async.discovery.families.Family`.
         cli: A `dobot_async.cli.family.Family`.
         fleet: A `dobot_async.fleet.families.Family`.
+        program: A `dobot_async.program.Vocabulary`.
     """
 
     models: tuple[str, ...] = ()
@@ -48,6 +49,7 @@ class Family:
     discovery: str = ""
     cli: str = ""
     fleet: str = ""
+    program: str = ""
 
 
 class Parts(Mapping[str, T], Generic[T]):

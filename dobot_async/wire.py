@@ -156,6 +156,9 @@ class Field:
         """The checked numbers of a value, in the order of the wire."""
         scalar = self.scalar
         if scalar.count == 1:
+            if self.kind is bool and not hasattr(value, "__index__") and not isinstance(value, float):
+                value = bool(value) if hasattr(value, "__float__") else value  # a truth of NumPy's
+
             number = scalar.check(self.name, value)
             if self.kind:
                 self.kind(number)  # an enum refuses a number that is none of its members

@@ -12,12 +12,14 @@ import pytest
 import dobot_async
 
 NAMES = [
+    "AccessoryVersion",
     "Alarm",
     "ArmAlarm",
     "CobotAlarm",
     "CobotInfo",
     "CobotModel",
     "CobotPose",
+    "Color",
     "ColorPort",
     "Command",
     "CommandRejected",
@@ -63,8 +65,10 @@ NAMES = [
     "UltraArmCoords",
     "UltraArmJog",
     "UltraArmLimits",
+    "UltraArmPose",
     "Unexpected",
     "Unreachable",
+    "UnsupportedError",
     "discover",
     "open_transport",
 ]
@@ -103,5 +107,5 @@ def test_errors_are_also_the_builtin_ones_that_users_catch() -> None:
     assert issubclass(dobot_async.ReplyTimeout, TimeoutError)
     errors = [getattr(dobot_async, name) for name in NAMES if isinstance(getattr(dobot_async, name), type)]
     ours = [error for error in errors if issubclass(error, Exception) and not issubclass(error, ValueError)]
-    assert len(ours) == 9
+    assert len(ours) == 10
     assert all(issubclass(error, dobot_async.DobotError) for error in ours)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractAsyncContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
@@ -45,6 +45,9 @@ class Family:
     far: tuple[float, ...]
     read: Command[None, Any]
     where: Callable[[Any], tuple[float, ...]]
+    details: Mapping[str, Any] = field(
+        default_factory=dict, compare=False
+    )  # what `simulate` needs, so that the arm can move
 
     def connect(self, url: str, **options: Any) -> AbstractAsyncContextManager[Any]:
         """The `connect` of its class."""
@@ -79,6 +82,7 @@ FAMILIES = (
         (120, 10, 10),
         ultraarm.GET_ANGLES,
         lambda arm: (arm.angles.j1, arm.angles.j2, arm.angles.j3),
+        {"homed": True},
     ),
 )
 each_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
@@ -121,7 +125,7 @@ async def test_objects_are_of_the_same_classes(family: Family) -> None:
 
 @each_family
 async def test_an_await_returns_when_the_arm_is_there(family: Family) -> None:
-    async with simulate(family.model, speed=FAST) as sim, family.connect(sim.url) as arm:
+    async with simulate(family.model, speed=FAST, **family.details) as sim, family.connect(sim.url) as arm:
         await arm.move_joints(*family.near)
         assert family.where(sim.arm) == pytest.approx((*family.near, *(0,) * 4)[: len(family.near)], abs=0.05)
         assert await arm.request(family.read, None) is not None
@@ -143,7 +147,7 @@ async def test_motions_can_be_awaited_in_any_order_and_more_than_once(family: Fa
 
 @each_family
 async def test_a_batch_that_is_left_by_an_error_sends_nothing(family: Family) -> None:
-    async with simulate(family.model, speed=FAST) as sim, family.connect(sim.url) as arm:
+    async with simulate(family.model, speed=FAST, **family.details) as sim, family.connect(sim.url) as arm:
         before = family.where(sim.arm)
         with pytest.raises(ZeroDivisionError):
             async with arm.queue.batch() as batch:
@@ -159,7 +163,7 @@ async def test_a_batch_that_is_left_by_an_error_sends_nothing(family: Family) ->
 
 @each_family
 async def test_a_stop_ends_pending_motions(family: Family) -> None:
-    async with simulate(family.model, speed=SLOW) as sim, family.connect(sim.url) as arm:
+    async with simulate(family.model, speed=SLOW, **family.details) as sim, family.connect(sim.url) as arm:
         motion = await arm.queue.move_joints(*family.far)
         behind = await arm.queue.move_joints(*family.near)
         await arm.stop()
@@ -172,7 +176,7 @@ async def test_a_stop_ends_pending_motions(family: Family) -> None:
 
 @each_family
 async def test_a_motion_that_takes_too_long_is_stopped(family: Family) -> None:
-    async with simulate(family.model, speed=SLOW) as sim, family.connect(sim.url) as arm:
+    async with simulate(family.model, speed=SLOW, **family.details) as sim, family.connect(sim.url) as arm:
         with pytest.raises(ReplyTimeout, match="the arm was stopped"):
             await arm.move_joints(*family.far, timeout=0.2)
 
@@ -181,7 +185,7 @@ async def test_a_motion_that_takes_too_long_is_stopped(family: Family) -> None:
 
 @each_family
 async def test_an_error_in_the_block_stops_the_arm(family: Family) -> None:
-    async with simulate(family.model, speed=SLOW) as sim:
+    async with simulate(family.model, speed=SLOW, **family.details) as sim:
         with pytest.raises(ZeroDivisionError):
             async with family.connect(sim.url) as arm:
                 await arm.queue.move_joints(*family.far)
@@ -193,7 +197,10 @@ async def test_an_error_in_the_block_stops_the_arm(family: Family) -> None:
 
 @each_family
 async def test_observers_send_reads_alone(family: Family) -> None:
-    async with simulate(family.model, speed=FAST) as sim, family.connect(sim.url, control=False) as arm:
+    async with (
+        simulate(family.model, speed=FAST, **family.details) as sim,
+        family.connect(sim.url, control=False) as arm,
+    ):
         await arm.request(family.read, None)
         with pytest.raises(ValueError, match="only reads"):
             await arm.queue.move_joints(*family.far)
@@ -204,7 +211,7 @@ async def test_observers_send_reads_alone(family: Family) -> None:
 
 @each_family
 async def test_nobody_answers(family: Family) -> None:
-    async with simulate(family.model, faults=Faults(silent=True)) as sim:
+    async with simulate(family.model, faults=Faults(silent=True), **family.details) as sim:
         with pytest.raises(ConnectFailed, match="answers at"):
             async with family.connect(sim.url, timeout=0.3):
                 pass
@@ -231,7 +238,7 @@ async def test_what_cannot_be_opened_in_time_tells_why_and_not_the_token(
 
 @each_family
 async def test_a_line_that_is_cut_ends_everything(family: Family) -> None:
-    async with simulate(family.model, speed=SLOW) as sim:
+    async with simulate(family.model, speed=SLOW, **family.details) as sim:
         with pytest.raises(ConnectionLost):
             async with family.connect(sim.url) as arm:
                 motion = await arm.queue.move_joints(*family.far)
@@ -241,7 +248,7 @@ async def test_a_line_that_is_cut_ends_everything(family: Family) -> None:
 
 @each_family
 async def test_a_line_that_is_cut_ends_the_motions_that_nobody_awaits(family: Family) -> None:
-    async with simulate(family.model, speed=SLOW) as sim, family.connect(sim.url) as arm:
+    async with simulate(family.model, speed=SLOW, **family.details) as sim, family.connect(sim.url) as arm:
         motion = await arm.queue.move_joints(*family.far)
         changes = aiter(arm.link.state)
         sim.unplug()

@@ -31,5 +31,8 @@ async def rig(
 ) -> AsyncIterator[tuple[Simulation, UltraArm, BadLine]]:
     """A simulated arm, a driver, and the line between them."""
     made = bad_lines(monkeypatch, in_order=True)
-    async with simulate("ultraarm", **(sim or {})) as simulation, UltraArm.connect(simulation.url, **options) as arm:
+    async with (
+        simulate("ultraarm", homed=True, **(sim or {})) as simulation,
+        UltraArm.connect(simulation.url, **options) as arm,
+    ):
         yield simulation, arm, made[0]

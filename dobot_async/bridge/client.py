@@ -17,7 +17,7 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable, Hashable
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from dobot_async._core.link.admission import Admission
 from dobot_async.bridge.desk import Desk, Refused, Request
@@ -92,7 +92,7 @@ class Client(Generic[F]):
         self._requests: set[asyncio.Task[None]] = set()
         self._writing: asyncio.Task[None] | None = None
         self._unsent: dict[Hashable, Request[F]] = {}
-        self._stopping: set[Any] = set()
+        self._stopping: set[bytes] = set()
         self._unanswered: deque[Request[F]] = deque()
         self._work = self._loop.create_task(self._run(), name=f"dobot_async bridge {name}")
         self._work.add_done_callback(self._ended)
@@ -203,11 +203,11 @@ class Client(Generic[F]):
                 continue
 
             self._unsent.clear()
-            subject = self._family.subject(frame)
+            stop = bytes(frame)
             if request.kind is Kind.WRITE:
                 self._take(request)
-            elif subject not in self._stopping:
-                self._stopping.add(subject)
+            elif stop not in self._stopping:
+                self._stopping.add(stop)
                 request.ahead = True
                 self._take(request)
             elif self._family.in_order:
@@ -277,7 +277,7 @@ class Client(Generic[F]):
         finally:
             self._forget(request)
             if request.ahead:
-                self._stopping.discard(self._family.subject(request.frame))
+                self._stopping.discard(bytes(request.frame))
             else:
                 self._room.release()
 

@@ -225,6 +225,9 @@ class Bridge(Generic[F]):
         if request.kind is Kind.STOP:
             return await self._stop(client, frame)
 
+        if request.kind is Kind.OFF:
+            return await self._urge(client, frame)
+
         if request.kind is Kind.WRITE:
             return await self._write(client, request)
 
@@ -243,6 +246,10 @@ class Bridge(Generic[F]):
         if holder and holder is not client and not holder.gone:
             self.cut(holder, f"{client.name} has stopped the arm")
 
+        return await self._urge(client, frame)
+
+    async def _urge(self, client: Client[F], frame: F) -> F:
+        """Passes something on ahead of everything else."""
         client.watch.sent(frame)
         reply = await self._line.ask(frame, urgent=True)
         client.watch.answered(frame, reply)

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from dobot_async.cli.addresses import connectable
 from dobot_async.cli.credentials import own_token
 from dobot_async.cli.session import Session, run
 
@@ -46,6 +47,7 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
     port 0 takes a free one. The first lines of the output are the URLs to connect to, and the token if one had to be
     made up: any address but this computer's own needs one. After them comes a line for whatever happens.
     """
+    session.refuse("SOURCE_URL says where the arm is", "url")
     if session.trace:
         raise click.UsageError("a bridge writes no trace: passwords go through it; trace the program that connects")
 
@@ -57,8 +59,9 @@ async def serve(session: Session, *, source: str, token: str | None, **details: 
     from dobot_async.bridge import bridge as bridged
 
     async with bridged(source, token=token, family=session.arm, **details) as running:
-        answer: dict[str, Any] = {"urls": running.urls}
-        text = "\n".join(running.urls)
+        urls = [connectable(url) for url in running.urls]
+        answer: dict[str, Any] = {"urls": urls}
+        text = "\n".join(urls)
         if running.token != token:
             answer["token"] = running.token
             text += f"\ntoken {running.token}"
@@ -66,4 +69,4 @@ async def serve(session: Session, *, source: str, token: str | None, **details: 
         events = aiter(running.events)
         session.output.answer(answer, text)
         async for event in events:
-            session.output.say(str(event))
+            session.output.answer(event, str(event))

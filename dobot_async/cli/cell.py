@@ -9,96 +9,77 @@ each arm, whatever the others do.
 from __future__ import annotations
 
 import asyncio
-import itertools
-from collections.abc import Awaitable, Callable, Collection, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
-from typing import Any, TextIO, TypeVar
+from typing import Any, TypeVar
 
-import anyio
 import click
 
-from dobot_async._core.util.tasks import run_shielded
-from dobot_async.cli.cell_program import execute, parse_cell_program
+from dobot_async.cli.cell_program import CellProgram, parse_cell_program, run_cell_program
+from dobot_async.cli.cell_watch import Reading, kind_of, observe, read, told_by, trace_of
+from dobot_async.cli.failures import FAILED, WrongFile
 from dobot_async.cli.output import Output
-from dobot_async.cli.params import ABOVE_ZERO
+from dobot_async.cli.params import ABOVE_ZERO, PROGRAM, Text
+from dobot_async.cli.program import wrong
 from dobot_async.cli.session import Session, run
+from dobot_async.cli.trace import TraceFile, tracing
 from dobot_async.errors import DobotError
-from dobot_async.fleet.cell import Cell, read_cell
-from dobot_async.fleet.families import family_of
+from dobot_async.fleet.cell import Cell, parse_cell
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.fleet.seat import Member
+from dobot_async.program import ProgramError
+from dobot_async.program.text import lines_in
 
 __all__ = ["cell"]
 
 T = TypeVar("T")
-FAILED = 1
-RETRY = 1.0  # seconds until an arm that did not answer is tried again
 COLUMNS = ("arm", "family", "tool in the cell", "alarms", "link")
-
-
-@dataclass(slots=True)
-class Reading:
-    """What an arm of the cell told.
-
-    Attributes:
-        family: Its family.
-        x: Of the tool, in the cell, mm; None if the arm did not answer.
-        y: The same.
-        z: The same.
-        alarms: What is set.
-        error: Why it did not answer.
-    """
-
-    family: str
-    x: float | None = None
-    y: float | None = None
-    z: float | None = None
-    alarms: tuple[str, ...] = ()
-    error: str | None = None
-
-    def cells(self, name: str) -> tuple[str, ...]:
-        """The row of a table."""
-        places = (self.x, self.y, self.z)
-        tool = "  ".join(f"{axis} {place:7.2f}" for axis, place in zip("xyz", places, strict=True) if place is not None)
-        return name, self.family, tool or "-", ", ".join(self.alarms) or "none", self.error or "good"
 
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The cell file, and how to speak."""
+    """The cell, and how to speak."""
 
     session: Session
-    path: Path
+    cell: Cell
 
     @property
     def output(self) -> Output:
         """Where to speak."""
         return self.session.output
 
-    def read(self) -> Cell:
-        """The cell; raises UsageError if the file is wrong."""
-        try:
-            return read_cell(self.path)
-        except ValueError as error:
-            raise click.UsageError(str(error)) from None
+    @asynccontextmanager
+    async def fleet(self, trace: TraceFile | None) -> AsyncIterator[Fleet[Any]]:
+        """Connects to all arms; the trace begins when they are connected."""
+        cell = self.cell
+        async with Fleet.connect(cell.members, zones=cell.zones, groups=cell.groups) as fleet:
+            self.session.commanding = True
+            for name, member in cell.members.items():
+                if trace:
+                    fleet[name].link.on_frame.add(trace_of(trace, name, member))
+
+            yield fleet
 
 
 @click.group()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("file", type=PROGRAM)
 @click.pass_context
-def cell(ctx: click.Context, file: Path) -> None:
+def cell(ctx: click.Context, file: Text) -> None:
     """Drive all arms of a cell, or watch them.
 
     FILE is a cell file (TOML): arms with their URLs, where they stand, their groups, and zones.
     """
-    ctx.meta[__name__] = Chosen(ctx.obj, file)
+    try:
+        ctx.meta[__name__] = Chosen(ctx.obj, parse_cell(file.text))
+    except ValueError as error:
+        raise WrongFile(f"{file.name}: {error}; nothing was sent") from None
 
 
 def chosen() -> Chosen:
     """What stands before the subcommand."""
     found: Chosen = click.get_current_context().meta[__name__]
+    found.session.refuse("a cell file has the URLs of the arms, and their families", "url", "arm")
     return found
 
 
@@ -109,8 +90,8 @@ def status() -> None:
     Ends with 1 if an arm does not answer.
     """
     here = chosen()
-    cell = here.read()
-    readings = run(alone(cell, lambda name, arm: read(cell.members[name], arm), control=False))
+    cell = here.cell
+    readings = run(alone(here, lambda name, arm: read(cell.members[name], arm), control=False))
     told = {name: told_by(cell.members[name], each) for name, each in readings.items()}
     here.output.answer({"arms": told}, table_text(told))
     end_with({name: each.error for name, each in told.items()})
@@ -123,12 +104,11 @@ def home() -> None:
     What earlier programs left in their queues is thrown away. Guarded arms go one after the other.
     """
     here = chosen()
-    here.read()
 
     async def work() -> None:
-        async with Fleet.from_file(here.path) as fleet:
-            here.session.commanding = True
-            await fleet.each("home")
+        with tracing(here.session.trace) as trace:
+            async with here.fleet(trace) as fleet:
+                await fleet.each("home")
 
     with here.output.working("homing"):
         run(work())
@@ -140,7 +120,7 @@ def home() -> None:
 def stop() -> None:
     """Stop all arms now, and empty their queues; those that answer, if others do not."""
     here = chosen()
-    results = run(alone(here.read(), lambda _, arm: arm.stop(), control=True))
+    results = run(alone(here, lambda _, arm: arm.stop(), control=True))
     errors = {name: str(error) if isinstance(error, Exception) else None for name, error in results.items()}
     text = "\n".join(f"{name}: {error or 'stopped'}" for name, error in errors.items())
     here.output.answer({"stopped": {name: error is None for name, error in errors.items()}, "errors": errors}, text)
@@ -148,31 +128,44 @@ def stop() -> None:
 
 
 @cell.command("run")
-@click.argument("program", type=click.File("r", encoding="utf-8-sig"))
-def run_program(program: TextIO) -> None:
+@click.argument("program", type=PROGRAM)
+@click.option("--dry-run", is_flag=True, help="Only check it: no arm is needed, and nothing is sent.")
+def run_program(program: Text, dry_run: bool) -> None:
     """Run a program of all arms.
 
     PROGRAM (- is standard input) has lines such as: left: move 200 0 50. Before the colon stand names of arms, or * for
     all, behind it a verb as for the command run, or: barrier NAME, zone NAME, leave NAME. The arms run side by side,
-    each its own lines. All lines are checked before anything is sent.
+    each its own lines. All lines are checked, for each arm, before anything is sent to any.
     """
     here = chosen()
-    cell = here.read()
-    try:
-        steps = parse_cell_program(program, cell)
-    except ValueError as error:
-        raise click.UsageError(f"{program.name} is wrong, and nothing was sent:\n{error}") from None
+    steps = parse(program, here.cell)
 
     async def work() -> None:
-        async with Fleet.from_file(here.path) as fleet:
-            here.session.commanding = True
-            await execute(fleet, steps)
+        with tracing(here.session.trace) as trace:
+            async with here.fleet(trace) as fleet:
+                await run_cell_program(fleet, steps)
 
-    with here.output.working(program.name):
-        run(work())
+    if not dry_run:
+        with here.output.working(program.name):
+            run(work())
 
-    done = {name: len(each) for name, each in steps.items()}
-    here.output.answer({"file": program.name, "commands": done}, f"{program.name}: {sum(done.values())} commands done")
+    counts = {name: len(each) for name, each in steps.items()}
+    answer = {"file": program.name, "commands": counts, **({"sent": False} if dry_run else {})}
+    done = "would run" if dry_run else "done"
+    here.output.answer(answer, f"{program.name}: {sum(counts.values())} commands {done}")
+
+
+def parse(program: Text, cell: Cell) -> CellProgram:
+    """Returns the lines of each arm; raises WrongFile with the line if one is wrong."""
+    try:
+        steps = parse_cell_program(lines_in(program.text), cell)
+    except ProgramError as error:
+        raise wrong(program, error.summary) from None
+
+    if not steps:
+        raise wrong(program, "it has no commands")
+
+    return steps
 
 
 @cell.command()
@@ -184,103 +177,36 @@ def watch(rate: float, count: int | None) -> None:
     Ends with Ctrl-C, and does not disturb programs that run on the arms, as far as their links can be shared.
     """
     here = chosen()
-    cell = here.read()
-    if here.output.terminal:
-        with here.output.table(COLUMNS) as draw:
-            run(observe(cell, rate, count, lambda told: draw([each.cells(name) for name, each in told.items()])))
-    else:
-        run(observe(cell, rate, count, lambda told: here.output.answer({"arms": told}, table_text(told))))
+    with tracing(here.session.trace) as trace:
+        if here.output.terminal:
+            with here.output.table(COLUMNS) as draw:
+                show = lambda told: draw([each.cells(name) for name, each in told.items()])  # noqa: E731
+                run(observe(here.cell, rate, count, show, trace))
+        else:
+            show = lambda told: here.output.answer({"arms": told}, table_text(told))  # noqa: E731
+            run(observe(here.cell, rate, count, show, trace))
 
 
 async def alone(
-    cell: Cell, question: Callable[[str, Any], Awaitable[T]], *, control: bool
+    here: Chosen, question: Callable[[str, Any], Awaitable[T]], *, control: bool
 ) -> dict[str, T | BaseException]:
     """Asks each arm for itself, at the same time; returns its answer, or why there is none."""
+    members = here.cell.members
+    with tracing(here.session.trace) as trace:
 
-    async def asked(name: str, member: Member[Any]) -> T:
-        options = {**member.options, "control": control, "queue": "keep"}
-        async with family_of(member.kind).kind.connect(member.url, **options) as arm:
-            return await question(name, arm)
+        async def asked(name: str, member: Member[Any]) -> T:
+            options = {**member.options, "control": control, "queue": "keep"}
+            async with kind_of(name, member, trace).connect(member.url, **options) as arm:
+                return await question(name, arm)
 
-    work = [asked(name, member) for name, member in cell.members.items()]
-    results = await asyncio.gather(*work, return_exceptions=True)
+        work = [asked(name, member) for name, member in members.items()]
+        results = await asyncio.gather(*work, return_exceptions=True)
+
     for result in results:
         if isinstance(result, BaseException) and not isinstance(result, (DobotError, OSError)):
             raise result
 
-    return dict(zip(cell.members, results, strict=True))
-
-
-async def read(member: Member[Any], arm: Any) -> Reading:
-    """Asks an arm for what is shown."""
-    family = family_of(member.kind)
-    place = await family.place(arm)
-    x, y, z, _ = member.base.to_cell(*place)
-    alarms = tuple(map(str, await arm.get_alarms())) if hasattr(arm, "get_alarms") else ()
-    return Reading(family.name, round(x, 3), round(y, 3), round(z, 3), alarms)
-
-
-async def observe(cell: Cell, rate: float, count: int | None, show: Callable[[Mapping[str, Reading]], None]) -> None:
-    """Shows what all arms tell at each tick; arms that do not answer are tried again."""
-    told = {name: Reading(family_of(member.kind).name, error="connecting") for name, member in cell.members.items()}
-    first = {name: asyncio.Event() for name in told}
-
-    def note(name: str, reading: Reading) -> None:
-        told[name] = reading
-        first[name].set()
-
-    async def watched() -> None:
-        for event in first.values():
-            await event.wait()
-
-        for number in itertools.count(1):
-            show(told)
-            if number == count:
-                break
-
-            await anyio.sleep(1 / rate)
-
-    tasks = [asyncio.create_task(watched())]
-    tasks += [
-        asyncio.create_task(follow(member, 1 / rate, partial(note, name))) for name, member in cell.members.items()
-    ]
-    try:
-        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for task in tasks:
-            task.cancel()
-
-        await run_shielded(joined(tasks))
-        for task in tasks:
-            if not task.cancelled():
-                task.result()
-
-
-async def joined(tasks: Collection[asyncio.Task[None]]) -> None:
-    """Returns when tasks have ended, however that is."""
-    await asyncio.wait(tasks)
-
-
-async def follow(member: Member[Any], interval: float, note: Callable[[Reading], None]) -> None:
-    """Notes what one arm tells, for ever."""
-    options = {**member.options, "control": False, "queue": "keep"}
-    while True:
-        try:
-            async with family_of(member.kind).kind.connect(member.url, **options) as arm:
-                while True:
-                    note(await read(member, arm))
-                    await anyio.sleep(interval)
-        except (DobotError, OSError) as error:
-            note(told_by(member, error))
-            await anyio.sleep(RETRY)
-
-
-def told_by(member: Member[Any], answer: Reading | BaseException) -> Reading:
-    """What an arm told, or why it did not."""
-    if isinstance(answer, BaseException):
-        return Reading(family_of(member.kind).name, error=str(answer))
-
-    return answer
+    return dict(zip(members, results, strict=True))
 
 
 def table_text(told: Mapping[str, Reading]) -> str:

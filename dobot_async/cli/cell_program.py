@@ -1,83 +1,104 @@
 """Programs of a cell: one file for all arms, of which each runs its own lines, side by side with the others.
 
-*: home
-left: move 220 0 40
-left, right: barrier ready      # nobody goes on before both are here
-right: zone bin                 # until leave, or its last line
-right: move 250 0 20 mode=movl
-right: leave bin
+    *: home
+    left: move 220 0 40
+    left, right: barrier ready      # nobody goes on before both are here
+    right: zone bin                 # until leave, or its last line
+    right: move 250 0 20 mode=movl
+    right: leave bin
+
+Each line is read and checked for each of its arms, as a line of `run` is, before anything is sent to any arm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass
 from typing import Any
 
-from dobot_async.cli.commands import ON_OFF
-from dobot_async.cli.program import parse_line
+from dobot_async.cli.failures import StepRefused
+from dobot_async.cli.program import execute
 from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell
+from dobot_async.fleet.families import family_of
 from dobot_async.fleet.fleet import Fleet
-from dobot_async.magician.arm import Magician
+from dobot_async.fleet.seat import Member
+from dobot_async.program import VOCABULARIES, ProgramError, Step
+from dobot_async.program.text import shortened
+from dobot_async.program.vocabulary import Reader, bare
 
-__all__ = ["Line", "execute", "parse_cell_program"]
+__all__ = ["CellProgram", "Meeting", "parse_cell_program", "run_cell_program", "word_of"]
 
-METHODS = {"home": "home", "move": "move_to", "joints": "move_joints", "wait": "wait", "suction": "suction"}
-"""The verbs of arms other than Magicians: what they are called on their queues."""
+WORDS = {"barrier", "zone", "leave"}
+UNGUARDED = {"rail", "tool"}
+"""What changes where an arm's tool is: a guard, which knows the way of each motion, does not hear of it in time."""
 
-WHOLE = {"wait"}
+ROUNDING = 1e-6  # mm
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
-    """What an arm is to do at one line of a program.
+class Meeting:
+    """A line that concerns other arms, too.
 
     Attributes:
         number: Of the line.
         text: As it was written.
-        word: barrier, zone, leave, or the verb.
-        arguments: The name of the barrier or zone; the command and its value; or what the verb takes.
-        meets: The arms that come to the barrier.
+        word: barrier, zone or leave.
+        name: Of the barrier, or the zone.
+        arms: Those that come to the barrier.
     """
 
     number: int
     text: str
     word: str
-    arguments: tuple[Any, ...]
-    meets: tuple[str, ...] = ()
+    name: str
+    arms: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"line {self.number} ({shortened(self.text)})"
 
 
-def parse_cell_program(lines: Iterable[str], cell: Cell) -> dict[str, list[Line]]:
+CellProgram = Mapping[str, Sequence[Step | Meeting]]
+"""The lines of each arm."""
+
+
+def parse_cell_program(lines: Iterable[str], cell: Cell) -> CellProgram:
     """Returns the lines of each arm.
 
     Raises:
-        ValueError: Lines are wrong; the message has each with its number.
+        ProgramError: Lines are wrong, for at least one of their arms.
     """
-    program: dict[str, list[Line]] = {name: [] for name in cell.members}
-    wrong = []
+    barriers: dict[str, tuple[str, ...]] = {}
+    parts = {name: Part(name, member, cell, barriers) for name, member in cell.members.items()}
+    problems = []
     for number, written in enumerate(lines, 1):
-        text = written.split("#", 1)[0].strip()
+        text = bare(written)
         if not text:
             continue
 
         try:
-            for name in arms_of(text, cell):
-                program[name].append(parse(number, text, name, cell))
-        except (ValueError, TypeError) as error:
-            wrong.append(f"line {number}: {error}")
+            arms = arms_of(text, cell)
+        except ValueError as error:
+            problems.append((number, str(error)))
+            continue
 
-    if not wrong and not any(program.values()):
-        wrong.append("it has no commands")
+        wrong: dict[str, str] = {}
+        for name in arms:
+            try:
+                parts[name].read(number, text.partition(":")[2].strip(), arms)
+            except (ValueError, TypeError) as error:
+                wrong.setdefault(str(error), name)
 
-    if wrong:
-        raise ValueError("\n".join(wrong))
+        problems += [(number, f"{name}: {problem}" if len(arms) > 1 else problem) for problem, name in wrong.items()]
 
-    return {name: each for name, each in program.items() if each}
+    if problems:
+        raise ProgramError(problems)
+
+    return {name: part.lines for name, part in parts.items() if part.lines}
 
 
-def arms_of(text: str, cell: Cell) -> list[str]:
+def arms_of(text: str, cell: Cell) -> tuple[str, ...]:
     """The arms that a line is for."""
     before, colon, _ = text.partition(":")
     if not colon:
@@ -85,88 +106,142 @@ def arms_of(text: str, cell: Cell) -> list[str]:
 
     names = [name.strip() for name in before.split(",")]
     if names == ["*"]:
-        return list(cell.members)
+        return tuple(cell.members)
 
     for name in names:
         if name not in cell.members:
-            raise ValueError(f"no arm {name!r}; there are: {', '.join(cell.members)}")
+            raise ValueError(f"no arm {shortened(name)!r}; there are: {', '.join(cell.members)}")
 
-    return list(dict.fromkeys(names))
+    return tuple(dict.fromkeys(names))
 
 
-def parse(number: int, text: str, name: str, cell: Cell) -> Line:
-    """What a line means for one of its arms."""
-    rest = text.partition(":")[2].strip()
-    word, *words = rest.split() or [""]
-    if word in {"barrier", "zone", "leave"}:
-        if len(words) != 1:
+def word_of(member: Member[Any]) -> str:
+    """The word of an arm's family, or of its model."""
+    return str(member.options.get("model", family_of(member.kind).name))
+
+
+class Part:
+    """What one arm has to do, as far as it was read.
+
+    Args:
+        name: The arm's.
+        member: What it is.
+        cell: Where it is.
+        barriers: The arms that come to each barrier, as far as the program was read.
+
+    Attributes:
+        lines: Its lines.
+    """
+
+    def __init__(self, name: str, member: Member[Any], cell: Cell, barriers: dict[str, tuple[str, ...]]) -> None:
+        self.lines: list[Step | Meeting] = []
+        self._name = name
+        self._member = member
+        self._zones = cell.zones
+        self._barriers = barriers
+        self._held: set[str] = set()
+        self._reader: Reader = VOCABULARIES[word_of(member)].reader(member.options)
+
+    def read(self, number: int, text: str, arms: tuple[str, ...]) -> None:
+        """Reads a line; raises ValueError or TypeError that says what is wrong."""
+        if not text:
+            raise ValueError("expected ARM: VERB ..., with a verb behind the colon")
+
+        word = text.split(maxsplit=1)[0]
+        self.lines.append(self._meeting(number, text, arms) if word in WORDS else self._step(number, text))
+
+    def _step(self, number: int, text: str) -> Step:
+        member = self._member
+        if not member.options.get("control", True):
+            raise ValueError(f"{self._name} takes no commands: its options say control = false")
+
+        step = self._reader.read(number, text)
+        place = self._reader.checked.place
+        if member.guard != "off" and step.verb in UNGUARDED:
+            raise ValueError(f"{step.verb} is not for an arm with a guard: it plans with the tool that it began with")
+
+        if member.limits and place:
+            x, y, z, _ = member.base.to_cell(*place[:3])
+            if not member.limits.contains(x, y, z, ROUNDING):
+                raise ValueError(f"({x:.1f}, {y:.1f}, {z:.1f}) of the cell is beyond the limits of {self._name}")
+
+        return step
+
+    def _meeting(self, number: int, text: str, arms: tuple[str, ...]) -> Meeting:
+        word, *names = text.split()
+        if len(names) != 1:
             raise ValueError(f"expected: {word} NAME")
 
-        if word != "barrier" and words[0] not in cell.zones:
-            raise ValueError(f"no zone {words[0]!r}; there are: {', '.join(cell.zones) or 'none'}")
+        (name,) = names
+        if word != "barrier" and name not in self._zones:
+            raise ValueError(f"no zone {shortened(name)!r}; there are: {', '.join(self._zones) or 'none'}")
 
-        return Line(number, rest, word, tuple(words), tuple(arms_of(text, cell)))
+        if (word == "zone" and name in self._held) or (word == "leave" and name not in self._held):
+            how = "is in it already" if word == "zone" else "is not in it"
+            raise ValueError(f"{word} {name}: {self._name} {how}")
 
-    if issubclass(cell.members[name].kind, Magician):
-        return Line(number, rest, word, parse_line(rest))
+        if word == "barrier" and set(self._barriers.setdefault(name, arms)) != set(arms):
+            raise ValueError(f"barrier {name} was for {', '.join(self._barriers[name])}, and is not for others later")
 
-    if word not in METHODS:
-        raise ValueError(f"no verb {word!r} for {name}; there are: {', '.join([*METHODS, 'barrier', 'zone', 'leave'])}")
+        if word != "barrier":
+            self._held ^= {name}
 
-    return Line(number, rest, word, tuple(argument(word, each) for each in words))
-
-
-def argument(word: str, text: str) -> Any:
-    """What an argument of a verb stands for."""
-    try:
-        return ON_OFF[text] if word == "suction" else int(text) if word in WHOLE else float(text)
-    except (ValueError, KeyError):
-        raise ValueError(f"{word}: {text!r} is not what it takes") from None
+        return Meeting(number, text, word, name, arms)
 
 
-async def execute(fleet: Fleet[Any], program: Mapping[str, Sequence[Line]]) -> None:
+async def run_cell_program(fleet: Fleet[Any], program: CellProgram) -> None:
     """Runs the lines of all arms side by side.
 
     Raises:
-        DobotError: An arm failed; a note has the line that was to be done.
-        ValueError: It leads where an arm cannot or must not go; the message has the line.
+        DobotError: An arm failed, or could not do a line; a note has the line.
     """
     await fleet.run({name: follow(fleet, name, lines) for name, lines in program.items()})
 
 
-async def follow(fleet: Fleet[Any], name: str, lines: Sequence[Line]) -> None:
+async def follow(fleet: Fleet[Any], name: str, lines: Sequence[Step | Meeting]) -> None:
     """Runs the lines of one arm: its queue is filled, and awaited before it meets others."""
     queue = fleet[name].queue
     held: dict[str, AsyncExitStack] = {}
-    line = lines[0]
     async with AsyncExitStack() as stack:
         try:
-            for line in lines:
-                if line.word in {"barrier", "zone", "leave"}:
-                    await queue.join()
-                    await meet(fleet, line, held, stack)
-                elif line.arguments and not isinstance(line.arguments[0], (int, float)):
-                    await queue.put(*line.arguments)
-                else:
-                    await getattr(queue, METHODS[line.word])(*line.arguments)
-
-            await queue.join()
+            for steps, meeting in stretches(lines):
+                await execute(queue, steps)
+                if meeting:
+                    await meet(fleet, meeting, held, stack)
         except DobotError as error:
-            error.add_note(f"{name}, line {line.number} ({line.text})")
+            error.__notes__ = [f"{name}, {note}" for note in getattr(error, "__notes__", ())]
             raise
-        except ValueError as error:
-            raise ValueError(f"line {line.number} ({line.text}): {error}") from None
 
 
-async def meet(fleet: Fleet[Any], line: Line, held: dict[str, AsyncExitStack], stack: AsyncExitStack) -> None:
+def stretches(lines: Iterable[Step | Meeting]) -> Iterator[tuple[list[Step], Meeting | None]]:
+    """Yields the steps up to each meeting, and those behind the last one."""
+    steps: list[Step] = []
+    for line in lines:
+        if isinstance(line, Step):
+            steps.append(line)
+        else:
+            yield steps, line
+            steps = []
+
+    yield steps, None
+
+
+async def meet(fleet: Fleet[Any], meeting: Meeting, held: dict[str, AsyncExitStack], stack: AsyncExitStack) -> None:
     """Does what concerns the other arms too."""
-    name = line.arguments[0]
-    if line.word == "barrier":
-        await fleet.barrier(name, *line.meets)
-    elif line.word == "leave":
-        if name in held:
+    name = meeting.name
+    try:
+        if meeting.word == "barrier":
+            await fleet.barrier(name, *meeting.arms)
+        elif meeting.word == "leave":
             await held.pop(name).aclose()
-    elif name not in held:
-        zone: AbstractAsyncContextManager[None] = fleet.zone(name)
-        held[name] = await stack.enter_async_context(AsyncExitStack())
-        await held[name].enter_async_context(zone)
+        else:
+            zone: AbstractAsyncContextManager[None] = fleet.zone(name)
+            held[name] = await stack.enter_async_context(AsyncExitStack())
+            await held[name].enter_async_context(zone)
+    except DobotError as error:
+        error.add_note(str(meeting))
+        raise
+    except ValueError as error:
+        refused = StepRefused(str(error))
+        refused.add_note(str(meeting))
+        raise refused from error

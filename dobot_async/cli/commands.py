@@ -7,20 +7,23 @@ from typing import Any
 
 import click
 
-from dobot_async.cli.families import FAMILIES, Told, chosen
+from dobot_async.cli.arms import FAMILIES, chosen
+from dobot_async.cli.family import Told
+from dobot_async.cli.params import DURATION
 from dobot_async.cli.session import Session
 
-__all__ = ["COMMANDS", "ON_OFF"]
+__all__ = ["alarms", "home", "info", "jog", "move", "pose", "stop", "suction"]
 
-MODES = list(dict.fromkeys(mode for family in FAMILIES.values() for mode in family.modes))
-DIRECTIONS = list(dict.fromkeys(direction for family in FAMILIES.values() for direction in family.directions))
 ON_OFF = {"on": True, "off": False}
 
 
 @click.command()
 @click.pass_obj
 def info(session: Session) -> None:
-    """Tell who the arm is: serial number, name and firmware version, as far as it tells them."""
+    """Tell who the arm is.
+
+    Serial number, name and firmware version, as far as it tells them.
+    """
     answer(session, session.ask(session.family.info, control=False))
 
 
@@ -36,7 +39,8 @@ def pose(session: Session) -> None:
 @click.pass_obj
 def alarms(session: Session, clear: bool) -> None:
     """Tell the alarms, with cause and remedy."""
-    session.only(*(name for name, family in FAMILIES.items() if family.alarms))
+    if not session.family.alarms:
+        session.only(*(name for name, family in FAMILIES.items() if family.alarms))
 
     async def question(arm: Any) -> tuple[object, ...]:
         if clear:
@@ -65,7 +69,6 @@ def home(session: Session) -> None:
 @click.argument("rest", type=float, nargs=-1, metavar="[R]...")
 @click.option(
     "--mode",
-    type=click.Choice(MODES, case_sensitive=False),
     help="magician: movj moves the joints, movl the tool along a straight line, jump lifts it. -angle: the numbers are "
     "joint angles, -inc: increments. ultraarm: to, by (increments) or joints (angles). "
     "mycobot and its models: to, linear or joints.  [default: movj, to]",
@@ -88,8 +91,8 @@ def move(session: Session, x: float, y: float, z: float, rest: tuple[float, ...]
 
 
 @click.command()
-@click.argument("direction", type=click.Choice(DIRECTIONS, case_sensitive=False), metavar="DIRECTION")
-@click.argument("seconds", type=click.FloatRange(min=0))
+@click.argument("direction")
+@click.argument("seconds", type=DURATION)
 @click.pass_obj
 def jog(session: Session, direction: str, seconds: float) -> None:
     """Jog in a direction for a time.
@@ -112,7 +115,9 @@ def suction(session: Session, state: str) -> None:
     On sucks, off lets go and stops the pump. Takes effect at once; what is in the arm's queue goes on.
     """
     on = ON_OFF[state]
-    session.only(*(name for name, family in FAMILIES.items() if family.pump))
+    if not session.family.pump:
+        session.only(*(name for name, family in FAMILIES.items() if family.pump))
+
     session.ask(lambda arm: session.family.suction(arm, on), queue="keep", on_error="leave")
     session.output.answer({"suction": on}, f"suction {state}")
 
@@ -123,9 +128,6 @@ def stop(session: Session) -> None:
     """Stop the arm now, and empty its queue."""
     session.ask(lambda arm: arm.stop(), queue="keep")
     session.output.answer({"stopped": True}, "stopped")
-
-
-COMMANDS = (info, pose, alarms, home, move, jog, suction, stop)
 
 
 def move_and_answer(session: Session, what: str, motion: Callable[[Any], Awaitable[None]]) -> None:

@@ -8,37 +8,17 @@ from urllib.parse import parse_qs, quote, urlsplit
 
 import click
 
-__all__ = ["TOKEN", "own_token", "token_file_option", "token_in_file", "with_token"]
+__all__ = ["own_token", "with_token"]
 
 TOKEN, BRIDGE_TOKEN = "DOBOT_TOKEN", "DOBOT_BRIDGE_TOKEN"
-FILE = "dobot_async.token_file"
 SCHEMES = {"tcp", "udp", "ws", "wss"}
 
 
-def note(ctx: click.Context, _: click.Parameter, value: Path | None) -> None:
-    """Keeps the file for `with_token`."""
-    if value is not None:
-        ctx.meta[FILE] = value
-
-
-def token_file_option(command: click.decorators.FC) -> click.decorators.FC:
-    """Adds the option that names a file with the token of the bridge to connect to."""
-    return click.option(
-        "--token-file",
-        type=click.Path(exists=True, dir_okay=False, path_type=Path),
-        expose_value=False,
-        callback=note,
-        help=f"A file with the token of the bridge at --url. Default: the variable {TOKEN}.",
-    )(command)
-
-
-def with_token(url: str) -> str:
+def with_token(url: str, file: Path | None) -> str:
     """Returns a URL with the token that --token-file or DOBOT_TOKEN gives for it; one of its own comes first.
 
     Raises UsageError for a file where no token is presented, or where the URL has one.
     """
-    context = click.get_current_context(silent=True)
-    file = context.meta.get(FILE) if context else None
     takes, has = urlsplit(url).scheme in SCHEMES, {"token", "token_file"} & parse_qs(urlsplit(url).query).keys()
     if file and (has or not takes):
         raise click.UsageError("--token-file is for a bridge at tcp, udp, ws or wss, whose URL has no token")

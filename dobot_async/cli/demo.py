@@ -17,10 +17,9 @@ from typing import Any
 
 import anyio
 import click
-from click.core import ParameterSource
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async.cli.output import joint_words, tool_words
+from dobot_async.cli.arms.magician import joint_words, tool_words
 from dobot_async.cli.params import ABOVE_ZERO
 from dobot_async.cli.session import Session, run
 from dobot_async.magician.arm import Magician
@@ -158,19 +157,16 @@ def ways(cycles: int) -> Iterator[tuple[tuple[float, float], tuple[float, float]
     help=f"Simulated seconds per second.  [default: {SPEED:g}]",
 )
 @click.option("--yes", is_flag=True, help="Do not ask before a real arm moves.")
-@click.pass_context
-def demo(ctx: click.Context, cycles: int, speed: float | None, yes: bool) -> None:
+@click.pass_obj
+def demo(session: Session, cycles: int, speed: float | None, yes: bool) -> None:
     """Let a simulated arm pick and place.
 
     It is reached through a (pseudo) serial port. With --url that arm does it, after a question, for it really moves;
     DOBOT_URL is not used here.
     """
-    session: Session = ctx.obj
     session.only("magician")
-    assert ctx.parent
     # An arm that happens to be in the environment must not move because somebody wants to see a demo.
-    given = ctx.parent.get_parameter_source("url") is ParameterSource.COMMANDLINE
-    url = session.url if given else None
+    url = session.url if "url" in session.given else None
     if url and speed:
         raise click.UsageError("--speed is for the simulated arm, not for one with a --url")
 

@@ -55,6 +55,7 @@ def discover_arms(
     A USB port is listed if its chip is one that arms have; --probe tells whether there is an arm. Where a search
     fails, a line on standard error says so, and the others go on.
     """
+    session.refuse("a search finds arms of all kinds, wherever they are", "url", "arm", "trace")
     own: dict[str, Source] = {}
     if broadcast:
         own[WiFiModules.name] = WiFiModules(broadcast)

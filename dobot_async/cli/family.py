@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from dobot_async.cli.pieces import Pieces
+__all__ = ["Family", "Pieces", "Reading", "Told"]
 
-__all__ = ["Family", "Reading", "Told"]
+Pieces = Callable[[bytes], Iterator[dict[str, Any]]]
+"""Yields what bytes consist of, in order: each with "offset" and "raw", and "junk" (the reason) or what it says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,7 @@ class Family:
         numbers: How many numbers a move has at most.
         alarms: Whether it has `get_alarms` and `clear_alarms`.
         pump: Whether it has one.
+        text: Whether it speaks lines of text.
     """
 
     kind: Any
@@ -62,3 +64,4 @@ class Family:
     numbers: int = 4
     alarms: bool = False
     pump: bool = True
+    text: bool = False

@@ -3,54 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import click
 
+from dobot_async.cli.failures import StepRefused
+from dobot_async.cli.params import PROGRAM, Text
+from dobot_async.cli.program import checked
 from dobot_async.cli.session import Session
-from dobot_async.ultraarm.arm import UltraArm
-from dobot_async.ultraarm.gcode import GCodeLine, parse_gcode
+from dobot_async.program.text import lines_in
 
 __all__ = ["gcode"]
 
 
 @click.command()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("file", type=PROGRAM)
 @click.option("--dry-run", is_flag=True, help="Only check it: no arm is needed, and nothing is sent.")
 @click.option("--constant-speed", is_flag=True, help="Run through it at constant speed.")
 @click.pass_obj
-def gcode(session: Session, file: Path, dry_run: bool, constant_speed: bool) -> None:
+def gcode(session: Session, file: Text, dry_run: bool, constant_speed: bool) -> None:
     """Run a G-code file on an ultraarm.
 
-    All lines are checked, against the manual's limits too, before anything is sent. F is mm/s. Ctrl-C stops the arm.
+    FILE may be - for standard input. All lines are checked, against the manual's limits too, before anything is sent. F
+    is mm/s. Ctrl-C stops the arm.
     """
+    from dobot_async.ultraarm.gcode import parse_gcode
+
     session.only("ultraarm")
-    lines = read(file)
+    lines = lines_in(file.text)
+    steps = checked(file, lambda: parse_gcode(lines))
     if not dry_run:
-        with session.output.counting(file.name, len(lines)) as report:
-            session.ask(lambda arm: execute(arm, file, report, constant_speed=constant_speed))
+        with session.output.counting(file.name, len(steps)) as report:
+            session.ask(lambda arm: execute(arm, lines, report, constant_speed=constant_speed))
 
     done = "would run" if dry_run else "done"
     session.output.answer(
-        {"file": str(file), "commands": len(lines), "sent": not dry_run}, f"{file}: {len(lines)} commands {done}"
+        {"file": file.name, "commands": len(steps), "sent": not dry_run}, f"{file.name}: {len(steps)} commands {done}"
     )
 
 
-def read(file: Path) -> Sequence[GCodeLine]:
-    """Returns a file's commands; raises UsageError for one that is wrong."""
-    try:
-        lines = parse_gcode(file)
-    except UnicodeDecodeError as error:
-        raise click.UsageError(f"{file} is not UTF-8 text: {error}") from None
-    except ValueError as error:
-        raise click.UsageError(f"{file} is wrong, and nothing was sent:\n{error}") from None
-
-    if not lines:
-        raise click.UsageError(f"{file} has no commands")
-
-    return lines
-
-
-async def execute(arm: UltraArm, file: Path, report: Callable[[int], None], *, constant_speed: bool) -> None:
+async def execute(arm: object, lines: Sequence[str], report: Callable[[int], None], *, constant_speed: bool) -> None:
     """Runs it to its end."""
-    await arm.run_gcode(file, constant_speed=constant_speed, progress=lambda done, _: report(done))
+    from dobot_async.ultraarm.arm import UltraArm
+
+    assert isinstance(arm, UltraArm)
+    try:
+        await arm.run_gcode(lines, constant_speed=constant_speed, progress=lambda done, _: report(done))
+    except ValueError as error:
+        raise StepRefused(str(error)) from error

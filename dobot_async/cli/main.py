@@ -1,11 +1,6 @@
-"""The command group: the options that come before a command, and what becomes of errors.
+"""The command group: the global options, and what becomes of errors. A command is imported when it runs.
 
-Exit codes:
-
-    0        done
-    1        the arm or the link failed; one line on standard error says how
-    2        wrong usage
-    128 + n  signal n ended it: 130 Ctrl-C, 143 SIGTERM; 141 if nobody reads the output any more
+`failures` has the exit codes.
 """
 
 from __future__ import annotations
@@ -14,36 +9,71 @@ import logging
 import os
 import signal
 import sys
-from typing import Any
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from dobot_async.cli.bridge import bridge
-from dobot_async.cli.cell import cell
-from dobot_async.cli.commands import COMMANDS
-from dobot_async.cli.credentials import token_file_option
-from dobot_async.cli.decode import decode
-from dobot_async.cli.demo import demo
-from dobot_async.cli.discover import discover_arms
-from dobot_async.cli.gcode import gcode
-from dobot_async.cli.monitor import monitor
-from dobot_async.cli.output import Output
-from dobot_async.cli.program import run_program
-from dobot_async.cli.serve import serve_on_zenoh
-from dobot_async.cli.session import ARMS, Interrupted, Session
-from dobot_async.cli.simulate import simulate
-from dobot_async.cli.wifi import set_up_wifi
+from dobot_async.cli.failures import FAILED, OUTPUT_CLOSED, Interrupted
 from dobot_async.errors import DobotError
+from dobot_async.families import Parts
 
-__all__ = ["cli"]
+if TYPE_CHECKING:
+    from dobot_async.cli.session import Session
 
-FAILED = 1
+__all__ = ["COMMANDS", "cli"]
+
 SILENT = logging.NullHandler()
-OUTPUT_CLOSED = 141  # what a shell reports of a program that SIGPIPE ended
+
+COMMANDS = {
+    "alarms": ("dobot_async.cli.commands:alarms", "Tell the alarms, with cause and remedy."),
+    "bridge": ("dobot_async.cli.bridge:bridge", "Give an arm to programs on a network."),
+    "cell": ("dobot_async.cli.cell:cell", "Drive all arms of a cell, or watch them."),
+    "decode": ("dobot_async.cli.decode:decode", "Decode the bytes of frames, or lines of text."),
+    "demo": ("dobot_async.cli.demo:demo", "Let a simulated arm pick and place."),
+    "discover": (
+        "dobot_async.cli.discover:discover_arms",
+        "Search for arms on USB, in the Wi-Fi, over BLE and on Zenoh.",
+    ),
+    "gcode": ("dobot_async.cli.gcode:gcode", "Run a G-code file on an ultraarm."),
+    "home": ("dobot_async.cli.commands:home", "Drive home, which calibrates the arm."),
+    "info": ("dobot_async.cli.commands:info", "Tell who the arm is."),
+    "jog": ("dobot_async.cli.commands:jog", "Jog in a direction for a time."),
+    "monitor": ("dobot_async.cli.monitor:monitor", "Watch pose, queue and alarms."),
+    "move": ("dobot_async.cli.commands:move", "Move the tool to a point."),
+    "pose": ("dobot_async.cli.commands:pose", "Tell where tool and joints are, in mm and degrees."),
+    "run": ("dobot_async.cli.program:run_program", "Run a program file."),
+    "serve": ("dobot_async.cli.serve:serve_on_zenoh", "Put an arm on Zenoh, under a name."),
+    "simulate": ("dobot_async.cli.simulate:simulate", "Simulate an arm until Ctrl-C."),
+    "stop": ("dobot_async.cli.commands:stop", "Stop the arm now, and empty its queue."),
+    "suction": ("dobot_async.cli.commands:suction", "Switch the suction cup."),
+    "wifi": ("dobot_async.cli.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
+}
+"""Where each command is, and what the help says of it."""
 
 
 class Group(click.Group):
-    """A group whose commands end with the exit codes above, never with a traceback for what an arm does."""
+    """A group whose commands are imported when they run, and end with exit codes, never with a traceback for an arm."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - the same for all
+        """The names of the commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - the same for all
+        """Imports a command."""
+        if cmd_name not in COMMANDS:
+            return None
+
+        module, _, name = COMMANDS[cmd_name][0].partition(":")
+        command: click.Command = getattr(import_module(module), name)
+        accept_behind(command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - the same for all
+        """Writes the list of the commands, and imports none of them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
     def invoke(self, ctx: click.Context) -> Any:
         """Runs a command."""
@@ -57,54 +87,118 @@ class Group(click.Group):
         except (KeyboardInterrupt, click.Abort):
             ctx.exit(128 + signal.SIGINT)
         except BrokenPipeError:
-            # What is still buffered must not be written when the interpreter ends.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            let_go_of_output()
             ctx.exit(OUTPUT_CLOSED)
         except (DobotError, OSError) as error:
             ctx.obj.output.fail(error)
+            if isinstance(error, OSError) and not isinstance(error, DobotError):
+                let_go_of_output()
+
             ctx.exit(FAILED)
 
 
-@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
-@click.option(
-    "--url",
-    envvar="DOBOT_URL",
-    help="Where the arm is: serial:///dev/ttyUSB0, serial://COM3, udp://192.168.1.20, tcp://host:port, ble: or sim: "
-    "(a simulated one). Default: DOBOT_URL.",
-)
-@token_file_option
-@click.option("--arm", type=click.Choice(list(ARMS)), default="magician", show_default=True, help="Which arm it is.")
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object on standard output.")
-@click.option(
-    "--trace",
-    type=click.Path(dir_okay=False, writable=True, allow_dash=True),
-    metavar="FILE",
-    help="Write every frame to and from the arm to FILE, decoded, one JSON object a line; - is standard error.",
+def let_go_of_output() -> None:
+    """Throws away what is still buffered: it must not be written, and fail once more, when the interpreter ends."""
+    if sys.stdout is not None:
+        try:
+            sys.stdout.flush()
+        except (OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class ArmWord(click.ParamType[str]):
+    """The word of a family, or of one of its models."""
+
+    name = "arm"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Reads a word."""
+        words = list(Parts[Any]("cli"))
+        if str(value).lower() not in words:
+            self.fail(f"{value!r} is none of {', '.join(words)}", param, ctx)
+
+        return str(value).lower()
+
+
+def global_options() -> list[click.Option]:
+    """The options that stand before a command, or behind it."""
+    return [
+        click.Option(
+            ["--url"],
+            help="Where the arm is: serial:///dev/ttyUSB0, serial://COM3, udp://192.168.1.20, tcp://host:port, ble: or "
+            "sim: (a simulated one). Default: DOBOT_URL.",
+        ),
+        click.Option(
+            ["--token-file"],
+            type=click.Path(exists=True, dir_okay=False, path_type=Path),
+            metavar="FILE",
+            help="A file with the token of the bridge at --url. Default: the variable DOBOT_TOKEN.",
+        ),
+        click.Option(
+            ["--arm"],
+            type=ArmWord(),
+            metavar="ARM",
+            help=f"Which arm it is: {', '.join(Parts[Any]('cli'))}.  [default: magician]",
+        ),
+        click.Option(["--json", "as_json"], is_flag=True, help="Answer in JSON alone on standard output."),
+        click.Option(
+            ["--trace"],
+            type=click.Path(dir_okay=False, writable=True, allow_dash=True),
+            metavar="FILE",
+            help="Write every frame to and from the arm to FILE, decoded, one JSON object a line; - is standard error.",
+        ),
+    ]
+
+
+def accept_behind(command: click.Command) -> None:
+    """Lets a command, and those below it, take the global options too, unless it has one of that name itself."""
+    own = {option for parameter in command.params for option in parameter.opts}
+    for option in global_options():
+        if not own & set(option.opts):
+            option.hidden, option.expose_value, option.callback = True, False, note
+            command.params.append(option)
+
+    if isinstance(command, click.Group):
+        for each in command.commands.values():
+            accept_behind(each)
+
+
+def note(ctx: click.Context, option: click.Parameter, value: Any) -> None:
+    """Takes what was given behind the command."""
+    if value and option.name:
+        take(ctx.obj, option.name, value)
+
+
+def take(session: Session, name: str, value: Any) -> None:
+    """Takes the value of a global option."""
+    from dobot_async.cli.output import Output
+
+    session.given.add({"as_json": "json"}.get(name, name))
+    if name == "as_json":
+        session.output = Output(as_json=True)
+    else:
+        setattr(session, name, value)
+
+
+@click.group(
+    cls=Group,
+    params=[*global_options()],
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(package_name="dobot-async")
 @click.pass_context
-def cli(ctx: click.Context, url: str | None, arm: str, as_json: bool, trace: str | None) -> None:
+def cli(ctx: click.Context, /, **options: Any) -> None:
     """Drive a desktop robot arm, or watch it.
 
-    Exit codes: 0 done, 1 the arm or the link failed, 2 wrong usage, 130 Ctrl-C. Ctrl-C stops the arm first.
+    The options may stand before the command, or behind it. Exit codes: 0 done, 1 the arm or the link failed, 2 wrong
+    usage, and nothing was sent, 130 Ctrl-C. Ctrl-C stops the arm first.
     """
+    from dobot_async.cli.output import Output
+    from dobot_async.cli.session import Session
+
     # What is of interest is told in one line at the end; without a handler Python writes warnings to standard error.
     logging.getLogger("dobot_async").addHandler(SILENT)
-    ctx.obj = Session(url, arm, trace, Output(as_json))
-
-
-for command in (
-    demo,
-    *COMMANDS,
-    run_program,
-    gcode,
-    monitor,
-    cell,
-    discover_arms,
-    set_up_wifi,
-    simulate,
-    bridge,
-    serve_on_zenoh,
-    decode,
-):
-    cli.add_command(command)
+    ctx.obj = Session(os.environ.get("DOBOT_URL") or None, "magician", None, Output(as_json=False))
+    for name, value in options.items():
+        if value:
+            take(ctx.obj, name, value)

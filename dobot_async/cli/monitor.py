@@ -8,7 +8,7 @@ from collections.abc import Callable
 import anyio
 import click
 
-from dobot_async.cli.families import Reading
+from dobot_async.cli.family import Reading
 from dobot_async.cli.output import Output
 from dobot_async.cli.params import ABOVE_ZERO
 from dobot_async.cli.session import Session, run

@@ -10,7 +10,7 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from typing import Any
@@ -18,9 +18,8 @@ from typing import Any
 import click
 
 from dobot_async.errors import ArmAlarm
-from dobot_async.magician.params import Pose
 
-__all__ = ["Output", "joint_words", "plain", "tool_words", "words"]
+__all__ = ["Output", "plain", "words"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +49,11 @@ class Output:
     def fail(self, error: Exception) -> None:
         """Prints what went wrong: a line on standard error, and an object in place of the answer with JSON."""
         message = " ".join(": ".join([*getattr(error, "__notes__", ()), str(error) or type(error).__name__]).split())
-        click.echo(f"error: {message}", err=True)
-        if self.as_json:
-            alarms = error.alarms if isinstance(error, ArmAlarm) else ()
-            self.answer({"error": type(error).__name__, "message": message, "alarms": alarms}, "")
+        with suppress(OSError):  # what failed may be the output itself
+            click.echo(f"error: {message}", err=True)
+            if self.as_json:
+                alarms = error.alarms if isinstance(error, ArmAlarm) else ()
+                self.answer({"error": type(error).__name__, "message": message, "alarms": alarms}, "")
 
     @contextmanager
     def working(self, what: str) -> Iterator[None]:
@@ -146,13 +146,3 @@ def words(value: Any) -> str:
         return f"({', '.join(map(words, value))})" if value else "none"
 
     return "nothing" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def tool_words(pose: Pose) -> str:
-    """Returns where the tool is, mm and degrees."""
-    return "  ".join(f"{axis} {getattr(pose, axis):7.2f}" for axis in "xyzr")
-
-
-def joint_words(pose: Pose) -> str:
-    """Returns the joints, degrees."""
-    return "  ".join(f"{joint} {getattr(pose, joint):7.2f}" for joint in ("j1", "j2", "j3", "j4"))

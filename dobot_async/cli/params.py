@@ -1,18 +1,23 @@
-"""What the options of several commands hold: a place to ask for arms, and numbers above 0."""
+"""What the options of several commands hold: a place to ask for arms, numbers above 0, times, and the text of files."""
 
 from __future__ import annotations
 
+import errno
 import math
+import sys
 from ipaddress import IPv4Address
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import click
 
-from dobot_async.discovery.wifi import PORT
+from dobot_async.cli.failures import WrongFile
+from dobot_async.program.text import LARGEST, read_text
 
-__all__ = ["ABOVE_ZERO", "Place"]
+__all__ = ["ABOVE_ZERO", "DURATION", "PROGRAM", "Place", "Text", "standard_input"]
 
 PORTS = range(1 << 16)
+MOST_SECONDS = 86400.0  # a day
 
 
 class Place(click.ParamType[tuple[str, int]]):
@@ -22,6 +27,8 @@ class Place(click.ParamType[tuple[str, int]]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, int]:
         """Reads ADDRESS or ADDRESS:PORT."""
+        from dobot_async.discovery.wifi import PORT
+
         if isinstance(value, tuple):
             return value
 
@@ -37,16 +44,57 @@ class Place(click.ParamType[tuple[str, int]]):
         return address, port
 
 
-class AboveZero(click.FloatRange):
-    """A number above 0; no range of click's keeps out what is no number."""
+class FiniteRange(click.FloatRange):
+    """Numbers of a range; no range of click's keeps out what is no number."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Reads a number."""
         number = float(super().convert(value, param, ctx))
-        if math.isnan(number):
-            self.fail(f"{value!r} is no number", param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is no finite number", param, ctx)
 
         return number
 
 
-ABOVE_ZERO = AboveZero(0, min_open=True)
+class Text(NamedTuple):
+    """The text of a file.
+
+    Attributes:
+        name: Of the file.
+        text: What is in it.
+    """
+
+    name: str
+    text: str
+
+
+class TextFile(click.ParamType[Text]):
+    """A file of UTF-8 text, or - for standard input; read before anything else is done."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Text:
+        """Reads the file."""
+        if isinstance(value, Text):
+            return value
+
+        name = "standard input" if value == "-" else click.format_filename(value)
+        try:
+            return Text(name, read_text(standard_input() if value == "-" else Path(value)))
+        except OSError as error:
+            self.fail(f"{name}: {error.strerror or error}", param, ctx)
+        except ValueError as error:
+            raise WrongFile(f"{name}: {error}; nothing was sent", ctx) from None
+
+
+def standard_input() -> bytes:
+    """Returns what standard input holds."""
+    if sys.stdin is None or sys.stdin.closed:
+        raise OSError(errno.EBADF, "it is closed")
+
+    return sys.stdin.buffer.read(LARGEST + 1)
+
+
+PROGRAM = TextFile()
+ABOVE_ZERO = FiniteRange(0, min_open=True)
+DURATION = FiniteRange(0, max=MOST_SECONDS)

@@ -46,6 +46,7 @@ def serve_on_zenoh(
     Without --zenoh, --listen, --connect or --lan it can be reached from this computer alone. The first line of the
     output is a URL to connect to. After it comes a line for whatever happens.
     """
+    session.refuse("SOURCE_URL says where the arm is", "url")
     if session.trace:
         raise click.UsageError("a server writes no trace: passwords go through it; trace the program that connects")
 

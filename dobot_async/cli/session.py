@@ -9,55 +9,43 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Sequence
-from contextlib import asynccontextmanager, nullcontext
-from dataclasses import dataclass
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import click
 
-from dobot_async._core.link.link import Link
+from dobot_async.cli.arms import FAMILIES
 from dobot_async.cli.credentials import with_token
-from dobot_async.cli.families import FAMILIES, Family
+from dobot_async.cli.failures import Interrupted
+from dobot_async.cli.family import Family
 from dobot_async.cli.output import Output
-from dobot_async.cli.trace import Trace, tracing
+from dobot_async.cli.trace import Trace, traced, tracing
+from dobot_async.program import VOCABULARIES, Vocabulary
 from dobot_async.transports import SCHEMES
 
-__all__ = ["ARMS", "Interrupted", "Session", "run"]
+__all__ = ["Session", "run"]
 
 T = TypeVar("T")
 
-ARMS = tuple(FAMILIES)
-"""The families, by the words of `--arm`."""
-
 # A terminal that is closed must not leave an arm moving, either.
-SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-
-
-class Interrupted(Exception):
-    """A signal ended the work, and everything was closed.
-
-    Attributes:
-        number: The signal's.
-        problems: What went wrong on the way out, such as an arm that did not acknowledge its stop.
-    """
-
-    def __init__(self, number: int, problems: Sequence[str]) -> None:
-        super().__init__(number)
-        self.number = number
-        self.problems = problems
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)]
 
 
 @dataclass(slots=True)
 class Session:
-    """What the options before the command say.
+    """What the global options say, before the command or behind it.
 
     Attributes:
         url: Of the arm, None if none was given.
-        arm: One of `ARMS`.
+        arm: Its family's word, or its model's.
         trace: The file for every frame, "-" for standard error.
         output: Where to speak.
         commanding: Whether an arm is held that stops if the work is interrupted.
+        token_file: A file with the token of the bridge at `url`.
+        given: The names of the options that were given, not those that came from the environment.
     """
 
     url: str | None
@@ -65,16 +53,40 @@ class Session:
     trace: str | None
     output: Output
     commanding: bool = False
+    token_file: Path | None = None
+    given: set[str] = field(default_factory=set)
 
     @property
     def family(self) -> Family:
         """The arm's family."""
         return FAMILIES[self.arm]
 
+    @property
+    def vocabulary(self) -> Vocabulary:
+        """What programs of the arm are written in; raises UsageError if it has none."""
+        if self.arm not in VOCABULARIES:
+            raise click.UsageError(f"there are no programs for --arm {self.arm}")
+
+        return VOCABULARIES[self.arm]
+
     def only(self, *arms: str) -> None:
         """Raises UsageError for a command that the arm's family does not have."""
         if self.arm not in arms:
             raise click.UsageError(f"this is for --arm {' or '.join(arms)} alone, not for {self.arm}")
+
+    def refuse(self, reason: str, *options: str) -> None:
+        """Raises UsageError if one of these options was given: what has no effect is not to look as if it had."""
+        for option in options:
+            if option in self.given:
+                raise click.UsageError(f"--{option}: {reason}")
+
+    def target(self) -> str:
+        """The URL of the arm; raises UsageError if there is none."""
+        if self.url:
+            return with_token(self.url, self.token_file)
+
+        forms = "; ".join(form for _, form in SCHEMES.values())
+        raise click.UsageError(f"which arm? Give --url or set DOBOT_URL, to one of: {forms}")
 
     def ask(
         self,
@@ -102,27 +114,12 @@ class Session:
         on_error: Literal["stop", "leave"] = "stop",
     ) -> AsyncIterator[Any]:
         """Connects to the session's arm, or to a URL, with the trace that was asked for."""
-        url = url or (self.url and with_token(self.url))
-        if not url:
-            forms = "; ".join(form for _, form in SCHEMES.values())
-            raise click.UsageError(f"which arm? Give --url or set DOBOT_URL, to one of: {forms}")
-
-        with tracing(self.trace, self.family.describe) if self.trace else nullcontext() as trace:
-            kind = traced(self.family.kind, trace) if trace else self.family.kind
+        url = url or self.target()
+        with tracing(self.trace) as trace:
+            kind = traced(self.family.kind, Trace(trace, self.family.describe)) if trace else self.family.kind
             async with kind.connect(url, control=control, queue=queue, on_error=on_error) as arm:
                 self.commanding = control and on_error == "stop"
                 yield arm
-
-
-def traced(kind: Any, trace: Trace) -> Any:
-    """Returns a kind of arm whose link tells a trace of every frame, those of the greeting included."""
-
-    class Traced(kind):  # type: ignore[misc]
-        def __init__(self, link: Link[Any], **options: Any) -> None:
-            super().__init__(link, **options)
-            link.on_frame.add(trace)
-
-    return Traced
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:

@@ -8,8 +8,9 @@ from typing import Any
 
 import click
 
+from dobot_async.cli.addresses import connectable
 from dobot_async.cli.params import ABOVE_ZERO, Place
-from dobot_async.cli.session import ARMS, Session, run
+from dobot_async.cli.session import Session, run
 
 __all__ = ["simulate"]
 
@@ -35,7 +36,6 @@ def faults(command: click.decorators.FC) -> click.decorators.FC:
 
 
 @click.command()
-@click.option("--arm", type=click.Choice(list(ARMS)), help="Which arm. Default: that of the option before the command.")
 @click.option(
     "--listen",
     default="pty",
@@ -57,7 +57,6 @@ def faults(command: click.decorators.FC) -> click.decorators.FC:
 def simulate(
     session: Session,
     /,
-    arm: str | None,
     listen: str,
     speed: float,
     seed: int | None,
@@ -69,7 +68,9 @@ def simulate(
     The first line of the output is the URL to connect to. Of ble, the second one is a variable that clients need in
     their environment.
     """
-    run(serve(session, arm or session.arm, listen=listen, announce=announce, speed=speed, seed=seed, line=line))
+    session.refuse("a simulated arm has a URL of its own: see --listen", "url")
+    session.refuse("trace the program that connects", "trace")
+    run(serve(session, session.arm, listen=listen, announce=announce, speed=speed, seed=seed, line=line))
 
 
 async def serve(
@@ -94,6 +95,7 @@ async def serve(
             await stack.enter_async_context(announced(simulation.url, *announce))
 
         needs = simulation.environment
-        lines = [simulation.url, *(f"{name}={value}" for name, value in needs.items())]
-        session.output.answer({"url": simulation.url} | ({"environment": needs} if needs else {}), "\n".join(lines))
+        url = connectable(simulation.url)
+        lines = [url, *(f"{name}={value}" for name, value in needs.items())]
+        session.output.answer({"url": url} | ({"environment": needs} if needs else {}), "\n".join(lines))
         await asyncio.Event().wait()

@@ -72,6 +72,7 @@ def set_up_wifi(
     if session.arm != "magician":
         raise click.UsageError("only a Magician has a Wi-Fi module that can be set up")
 
+    session.target()
     password = "" if is_open else read_password(ssid)
 
     async def join() -> Joined:

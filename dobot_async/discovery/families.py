@@ -10,9 +10,10 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.errors import CommandRejected, ConnectFailed
 from dobot_async.families import Each
-from dobot_async.magician.arm import DeviceInfo, Magician
+from dobot_async.magician.arm import Magician
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.ultraarm.arm import UltraArm
 
@@ -60,11 +61,9 @@ async def probe_mycobot(url: str, timeout: float) -> DeviceInfo:
 
         try:
             async with MyCobot.connect(url, model=model, control=False, timeout=left) as arm:
-                version = (await arm.get_info()).system_version
+                return await arm.get_info()
         except ConnectFailed as error:
             problem = error
-        else:
-            return DeviceInfo(serial_number="", name="", version="" if version is None else f"{version:g}")
 
     raise problem
 

@@ -7,7 +7,7 @@ from collections.abc import AsyncGenerator
 from dataclasses import dataclass
 from typing import Protocol
 
-from dobot_async.magician.arm import DeviceInfo
+from dobot_async.arms.info import DeviceInfo
 
 __all__ = ["DiscoveryProblem", "Found", "Source", "natural", "printable"]
 

@@ -22,16 +22,23 @@ on_failure = "group"                         # or "fleet", "alone"
 
 from __future__ import annotations
 
+import inspect
 import tomllib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NoReturn, cast
+from urllib.parse import urlsplit
 
+from dobot_async.arms.session import check_options
+from dobot_async.families import families
 from dobot_async.fleet.families import FAMILIES, AnyArm
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.seat import Member
 from dobot_async.fleet.shapes import Box, Cylinder, Shape
+from dobot_async.program.text import read_text, shortened
+from dobot_async.transports import SCHEMES, hidden
 
 __all__ = ["Cell", "parse_cell", "read_cell"]
 
@@ -56,18 +63,25 @@ class Cell:
 def read_cell(path: Path) -> Cell:
     """Reads a cell file; raises ValueError, with the place in it, if it is wrong."""
     try:
-        return parse_cell(path.read_text(encoding="utf-8"))
+        return parse_cell(read_text(path))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
 
 def parse_cell(text: str) -> Cell:
     """Returns what the text of a cell file says; raises ValueError, with the place in it, if it is wrong."""
-    whole = tomllib.loads(text)
+    try:
+        whole = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
     known(whole, ("arms", "zones", "groups"), "the file")
     arms, zones, groups = (tables(whole.get(name, {}), name) for name in ("arms", "zones", "groups"))
     if not arms:
         raise ValueError("there are no arms; begin with [arms.NAME] and its url")
+
+    for name in arms:
+        check_name(name)
 
     cell = Cell(
         {name: at(f"arms.{name}", member, table) for name, table in arms.items()},
@@ -85,6 +99,10 @@ def member(table: Mapping[str, Any]) -> Member[AnyArm]:
     """An arm."""
     known(table, ARM_KEYS, "an arm")
     url, family = text(table, "url"), text(table, "family", "magician")
+    if urlsplit(url).scheme not in SCHEMES:
+        forms = "; ".join(form for _, form in SCHEMES.values())
+        raise ValueError(f"url: {hidden(url)!r} has no scheme that leads to an arm; use one of: {forms}")
+
     kinds = {each.name: each.arm for each in FAMILIES}
     if family not in kinds:
         raise ValueError(f"family: one of {', '.join(kinds)}, not {family!r}")
@@ -92,6 +110,8 @@ def member(table: Mapping[str, Any]) -> Member[AnyArm]:
     options = dict(sub(table, "options"))
     if "model" in table:
         options["model"] = text(table, "model")
+
+    options = at("options", partial(connect_options, family, kinds[family]), options)
 
     limits = sub(table, "limits")
     return Member(
@@ -104,6 +124,68 @@ def member(table: Mapping[str, Any]) -> Member[AnyArm]:
         clearance=number(table, "clearance", 0.0),
         limits=at("limits", box, limits) if limits else None,
     )
+
+
+def connect_options(family: str, kind: type[Any], table: Mapping[str, Any]) -> dict[str, Any]:
+    """What `connect` of a family is given; raises ValueError for what it does not take."""
+    parameters = inspect.signature(kind.connect).parameters
+    defaults = {name: each.default for name, each in parameters.items() if name not in UNSUITABLE}
+    known(table, [name for name in defaults if kinds_of(defaults[name])], f"connect of a {family}")
+    found = {name: option(name, defaults[name], value) for name, value in table.items()}
+    model, words = found.get("model"), (family, *dict(families())[family].models)
+    if model is not None and model not in words:
+        raise ValueError(f"model: one of {', '.join(words[1:])}, not {model!r}")
+
+    given = {**defaults, **found}
+    check_options(given["queue"], given["on_error"], given["timeout"], given["reply_timeout"])
+    return found
+
+
+def option(name: str, default: object, value: Any) -> Any:
+    """The value of an option, of the kind that its default is of; raises ValueError for others."""
+    kinds = kinds_of(default)
+    if isinstance(value, bool):
+        right = bool in kinds
+    elif isinstance(value, list):
+        return span({name: value}, name) if tuple in kinds else wrong_kind(name, value)
+    elif isinstance(value, int | float):
+        right = float in kinds
+        number({name: value}, name)
+    else:
+        right = isinstance(value, kinds)
+
+    return value if right else wrong_kind(name, value)
+
+
+def kinds_of(default: object) -> tuple[type[Any], ...]:
+    """What may be written in the place of a default; nothing if it is no kind that TOML has."""
+    return next((kinds for kind, kinds in KINDS.items() if isinstance(default, kind)), ())
+
+
+def wrong_kind(name: str, value: object) -> NoReturn:
+    """Raises ValueError."""
+    raise ValueError(f"{name}: {value!r} is not what it takes")
+
+
+UNSUITABLE = {"url"}
+KINDS: Mapping[type[Any], tuple[type[Any], ...]] = {
+    bool: (bool,),
+    tuple: (float, tuple),
+    int: (float,),
+    float: (float,),
+    str: (str,),
+    type(None): (bool, float, str),
+}
+"""What an option may be, by the type of its default."""
+
+
+def check_name(name: str) -> None:
+    """Raises ValueError for a name that a line of a program could not have before its colon."""
+    if not name.isprintable() or len(name) > LONGEST or name.strip() != name or not name or set(name) & set(":,#*"):
+        raise ValueError(f"arms.{shortened(name)!r}: a name has 1 to {LONGEST} characters, and none of : , # *")
+
+
+LONGEST = 64
 
 
 def frame(table: Mapping[str, Any]) -> BaseFrame:
@@ -199,7 +281,10 @@ def number(table: Mapping[str, Any], name: str, default: float | None = None) ->
     """A number; raises ValueError if it is missing and there is no default."""
     value = table.get(name, default)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:
+            raise ValueError(f"{name}: the number is too large") from None
 
     raise ValueError(f"{name}: {'it is missing' if value is None else f'expected a number, not {value!r}'}")
 

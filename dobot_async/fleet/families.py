@@ -107,7 +107,7 @@ class FleetMagician(Magician):
         self.queue: FleetMagicianQueue = FleetMagicianQueue(self._executor)
 
     @asynccontextmanager
-    async def jogging(self, direction: Jog) -> AsyncIterator[None]:
+    async def jogging(self, direction: Jog | str) -> AsyncIterator[None]:
         """Jogs until the block ends, once the fleet allows it; see `Magician.jogging`."""
         async with self.queue.roaming(), super().jogging(direction):
             yield
@@ -137,7 +137,7 @@ class FleetUltraArm(UltraArm):
         self.queue: FleetUltraArmQueue = FleetUltraArmQueue(self._executor, self.pump)
 
     @asynccontextmanager
-    async def jogging(self, direction: UltraArmJog, **options: Any) -> AsyncIterator[None]:
+    async def jogging(self, direction: UltraArmJog | str, **options: Any) -> AsyncIterator[None]:
         """Jogs until the block ends, once the fleet allows it; see `UltraArm.jogging`."""
         async with self.queue.roaming(), super().jogging(direction, **options):
             yield

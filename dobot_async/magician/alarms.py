@@ -96,7 +96,12 @@ PLAN = (
     Alarm(0x12, "PLAN_INV_LIMIT", "target beyond the joints' limits", NEW_TARGET),
     Alarm(0x13, "PLAN_PUSH_DATA_REPEAT", "an arc or a straight jump has the same point twice", NEW_POINTS),
     Alarm(0x14, "PLAN_ARC_INPUT_PARAM", "no circle goes through the three points of the arc", NEW_POINTS),
-    Alarm(0x15, "PLAN_JUMP_PARAM", "a jump begins or ends above its zLimit", "raise zLimit, then clear the alarms"),
+    Alarm(
+        0x15,
+        "PLAN_JUMP_PARAM",
+        "a jump begins or ends above its zLimit, or is to lift by less than 0",
+        "raise zLimit or the height, then clear the alarms",
+    ),
     Alarm(0x16, "PLAN_LINE_HAND", "a straight line would need the arm's other orientation", NEW_TARGET),
     Alarm(0x17, "PLAN_LINE_OUT_SPACE", "a straight line would leave the workspace", NEW_TARGET),
     Alarm(0x18, "PLAN_ARC_OUT_SPACE", "an arc would leave the workspace", NEW_POINTS),

@@ -3,80 +3,43 @@
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import AsyncIterator, Coroutine
-from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass, replace
-from enum import Enum
+from contextlib import asynccontextmanager
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
 
-import anyio
-
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
-from dobot_async._core.util.arguments import check_duration
-from dobot_async._core.util.tasks import run_concurrently, run_shielded
+from dobot_async._core.util.arguments import check_timeout
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.arms.session import arm_session, check_options, open_in_time, run_owned
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped
 from dobot_async.magician import commands as c
 from dobot_async.magician import frame
 from dobot_async.magician.alarms import Alarm, decode
+from dobot_async.magician.arguments import to_choice, to_flag
+from dobot_async.magician.declared import told_rail
 from dobot_async.magician.executor import MagicianExecutor
+from dobot_async.magician.goals import Need, Plan
+from dobot_async.magician.hand import Led
+from dobot_async.magician.jogs import Jog
 from dobot_async.magician.kinematics import Kinematics
 from dobot_async.magician.queue import MagicianQueue
+from dobot_async.magician.ranges import check_ranges
 from dobot_async.magician.reach import check_reach as check_target
+from dobot_async.magician.sensors import Sensors
 from dobot_async.magician.verbs import Verbs
 from dobot_async.magician.wifi import WiFi
 from dobot_async.transports import Transport
 from dobot_async.wire import Command, Queueing
 
-__all__ = ["DeviceInfo", "Jog", "Magician"]
+__all__ = ["Jog", "Magician"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
 TEACH_INTERVAL = 0.05
 
-
-class Jog(Enum):
-    """A direction to jog in: of the tool, of a joint, or along the rail. Manual 2.10.4."""
-
-    X_PLUS = (False, c.JOGKey.AP_DOWN)
-    X_MINUS = (False, c.JOGKey.AN_DOWN)
-    Y_PLUS = (False, c.JOGKey.BP_DOWN)
-    Y_MINUS = (False, c.JOGKey.BN_DOWN)
-    Z_PLUS = (False, c.JOGKey.CP_DOWN)
-    Z_MINUS = (False, c.JOGKey.CN_DOWN)
-    R_PLUS = (False, c.JOGKey.DP_DOWN)
-    R_MINUS = (False, c.JOGKey.DN_DOWN)
-    J1_PLUS = (True, c.JOGKey.AP_DOWN)
-    J1_MINUS = (True, c.JOGKey.AN_DOWN)
-    J2_PLUS = (True, c.JOGKey.BP_DOWN)
-    J2_MINUS = (True, c.JOGKey.BN_DOWN)
-    J3_PLUS = (True, c.JOGKey.CP_DOWN)
-    J3_MINUS = (True, c.JOGKey.CN_DOWN)
-    J4_PLUS = (True, c.JOGKey.DP_DOWN)
-    J4_MINUS = (True, c.JOGKey.DN_DOWN)
-    RAIL_PLUS = (False, c.JOGKey.EP_DOWN)
-    RAIL_MINUS = (False, c.JOGKey.EN_DOWN)
-
-
-STILL = c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE)
-
-TOOLS: tuple[tuple[Command[Any, None], Any], ...] = (
-    (c.SET_END_EFFECTOR_LASER, c.EndEffectorLaser(is_ctrl_enabled=False, is_on=False)),
-    (c.SET_E_MOTOR, c.EMotor(0, is_enabled=False, speed=0)),
-    (c.SET_E_MOTOR, c.EMotor(1, is_enabled=False, speed=0)),
-)
-"""What is switched off, beside the stop, when the arm's block is left by an error: nothing burns or turns after it."""
-
-LEAVING: tuple[tuple[Command[Any, None], Any], ...] = (
-    (c.SET_QUEUED_CMD_FORCE_STOP_EXEC, None),
-    (c.SET_QUEUED_CMD_CLEAR, None),
-    (c.SET_JOG_CMD, STILL),
-    *TOOLS,
-)
-"""All that ends what the arm does, the stop first."""
 
 BARRIERS = (
     c.GET_END_EFFECTOR_PARAMS,
@@ -95,22 +58,7 @@ BARRIERS = (
 """Cheap reads used as barriers: the answer to one proves that earlier requests will not be answered."""
 
 
-@dataclass(frozen=True, slots=True)
-class DeviceInfo:
-    """Who an arm is.
-
-    Attributes:
-        serial_number: The vendor's.
-        name: The user's.
-        version: Of the firmware, "3.2.1".
-    """
-
-    serial_number: str
-    name: str
-    version: str
-
-
-class Magician(Verbs[Coroutine[Any, Any, None]]):
+class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
     """A Dobot Magician; made by `connect`. Each verb returns when the arm has done it.
 
     A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
@@ -118,7 +66,6 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
     Attributes:
         link: The connection, with its state, events and figures.
         queue: The arm's queue, with the same verbs.
-        kinematics: The arm's geometry with the end effector that it had when it was connected.
         wifi: Which network the arm joins, and whether it is in it.
     """
 
@@ -132,7 +79,6 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
     ) -> None:
         self.link = link
         self.wifi = WiFi(link)
-        self.kinematics = Kinematics()
         self._check_reach = check_reach
         self._fresh = fresh
         self._executor = MagicianExecutor(link, window, self._check)
@@ -207,6 +153,11 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
             assert isinstance(arm, cls)
             yield arm
 
+    @property
+    def kinematics(self) -> Kinematics:
+        """The arm's geometry with the end effector that it was told, or that it had when it was connected."""
+        return self.queue.kinematics
+
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
         """Sends any row of the command table immediately, and returns the arm's answer.
 
@@ -216,22 +167,32 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
             timeout: Seconds, repetitions included; the row's own by default.
 
         Raises:
-            ValueError: The parameters do not fit, the command must be queued, or the connection only reads.
+            ValueError: The parameters do not fit, or are such that no motion would end; the command must be queued; or
+                the connection only reads.
             ReplyTimeout: No answer came.
             ConnectionLost: The link is gone.
         """
         if command.queueing is Queueing.ALWAYS:
             raise ValueError(f"{command.name} goes through the queue: await arm.queue.put(...)")
 
+        check_ranges(value)
         return await self.link.request(command, value, timeout=timeout)
 
     async def get_pose(self, *, timeout: float | None = None) -> c.Pose:
         """Returns where the tool is (mm, degrees) and the joints (degrees). Manual 2.4.1."""
         return await self.link.request(c.GET_POSE, None, timeout=timeout)
 
+    async def get_joints(self, *, timeout: float | None = None) -> tuple[float, ...]:
+        """Returns the four joint angles, degrees. Manual 2.4.1."""
+        return (await self.get_pose(timeout=timeout)).joints
+
     async def get_rail(self, *, timeout: float | None = None) -> float:
-        """Returns where the arm stands on its rail, in mm."""
-        return await self.link.request(c.GET_POSE_L, None, timeout=timeout)
+        """Returns where the arm stands on its rail, in mm.
+
+        Raises:
+            UnsupportedError: It has none, or was not told that it has; see `set_rail`.
+        """
+        return told_rail(await self.link.request(c.GET_POSE_L, None, timeout=timeout))
 
     async def get_info(self, *, timeout: float | None = None) -> DeviceInfo:
         """Returns serial number, name and firmware version. Manual 2.3."""
@@ -259,45 +220,30 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
         await self.clear_alarms()
         await self.queue.resume()
 
-    async def get_input(self, address: int, *, timeout: float | None = None) -> bool:
-        """Returns the level of a digital input (1 to 20). Manual 2.16.4."""
-        return bool((await self.link.request(c.GET_IODI, address, timeout=timeout)).level)
-
-    async def get_output(self, address: int, *, timeout: float | None = None) -> bool:
-        """Returns the level that a digital output (1 to 20) was set to. Manual 2.16.2."""
-        return bool((await self.link.request(c.GET_IODO, address, timeout=timeout)).level)
-
-    async def get_adc(self, address: int, *, timeout: float | None = None) -> int:
-        """Returns an analog input (1 to 20), 0 to 4095. Manual 2.16.5."""
-        return (await self.link.request(c.GET_IOADC, address, timeout=timeout)).value
-
-    async def set_color_sensor(self, port: c.ColorPort, *, on: bool = True, timeout: float | None = None) -> None:
-        """Switches the colour sensor at a port."""
-        await self.link.request(c.SET_COLOR_SENSOR, c.ColorSensor(on, port), timeout=timeout)
-
-    async def get_color(self, *, timeout: float | None = None) -> c.Color:
-        """Returns the colour that the sensor sees."""
-        return await self.link.request(c.GET_COLOR_SENSOR, None, timeout=timeout)
-
-    async def set_infrared_sensor(self, port: c.InfraredPort, *, on: bool = True, timeout: float | None = None) -> None:
-        """Switches the infrared sensor at a port."""
-        await self.link.request(c.SET_INFRARED_SENSOR, c.InfraredSensor(on, port), timeout=timeout)
-
-    async def get_infrared(self, port: c.InfraredPort, *, timeout: float | None = None) -> bool:
-        """Returns whether the infrared sensor at a port sees something."""
-        state = await self.link.request(c.GET_INFRARED_SENSOR, port, timeout=timeout)
-        return state != 0
-
     async def set_rail(
         self, *, on: bool = True, version: c.AccessoryVersion = c.AccessoryVersion.V1, timeout: float | None = None
     ) -> None:
-        """Says whether the arm stands on a rail; needed before `move_to(l=...)`."""
-        await self.link.request(c.SET_DEVICE_WITH_L, c.DeviceWithL(on, version), timeout=timeout)
+        """Says whether the arm stands on a rail; needed after each power-up, before it moves along it.
+
+        Args:
+            on: Whether it does.
+            version: Which hardware version the rail is.
+            timeout: Seconds.
+        """
+        value = c.DeviceWithL(to_flag("on", on), to_choice("version", version, c.AccessoryVersion))
+        await self.link.request(c.SET_DEVICE_WITH_L, value, timeout=timeout)
+        self.queue.declared.told(value)
 
     async def set_end_effector(self, tool: c.EndEffectorParams, *, timeout: float | None = None) -> None:
         """Says which tool is on the arm: SuctionCup(), Gripper(), Pen(), Laser() or its own mm. Manual 2.9.1."""
+        if not isinstance(tool, c.EndEffectorParams):
+            raise TypeError(
+                f"tool must be a SuctionCup(), Gripper(), Pen(), Laser() or EndEffectorParams, not {tool!r}"
+            )
+
         await self.link.request(c.SET_END_EFFECTOR_PARAMS, tool, timeout=timeout)
-        self.kinematics = replace(self.kinematics, x_bias=tool.x_bias, y_bias=tool.y_bias, z_bias=tool.z_bias)
+        x, y, z = tool.x_bias, tool.y_bias, tool.z_bias
+        self.queue.kinematics = replace(self.kinematics, x_bias=x, y_bias=y, z_bias=z)
 
     async def pause(self) -> None:
         """Lets the arm finish the command that it executes, and then wait. Manual 2.19.2."""
@@ -307,77 +253,43 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
         """Lets a paused arm go on. Manual 2.19.1."""
         await self.queue.resume()
 
-    async def stop(self, *, timeout: float = 5.0) -> None:
+    async def stop(self, *, timeout: float = 5.0, tools: Literal["off", "leave"] = "off") -> None:
         """Stop the arm now, ahead of everything; pending Motions raise MotionStopped. Manual 2.19.3.
+
+        The laser and the stepper motors stop as well. The pump keeps its state, so that nothing is dropped.
 
         Args:
             timeout: Seconds to wait for the arm to acknowledge it; it is repeated after that, too, until the arm does.
+            tools: "leave" leaves laser and stepper motors as they are.
 
         Raises:
             ReplyTimeout: The arm has not acknowledged it yet.
             ConnectionLost: The link is gone.
         """
-        await self.queue.stop(timeout=timeout)
-
-    async def jog(self, direction: Jog, seconds: float) -> None:
-        """Jog for a time, at the speed of the JOG parameters, then stop. Manual 2.10.4.
-
-        Args:
-            direction: Of the tool, of a joint, or along the rail.
-            seconds: How long, finite and not negative.
-        """
-        seconds = check_duration(seconds)
-        async with self.jogging(direction):
-            await anyio.sleep(seconds)
-
-    @asynccontextmanager
-    async def jogging(self, direction: Jog) -> AsyncIterator[None]:
-        """Jog until the block ends, however it ends; the stop is repeated until the arm has heard it. Manual 2.10.4.
-
-        Raises:
-            ReplyTimeout: The arm does not acknowledge that it is to begin, or that it is to stop.
-        """
-        is_joint, key = direction.value
-        async with self.link.cleanup.at_end(self._stop_jog, "the end of the jog"):
-            await self.link.request(c.SET_JOG_CMD, c.JOGCmd(is_joint, key))
-            yield
-
-    async def _stop_jog(self) -> None:
-        await self.link.request(c.SET_JOG_CMD, STILL, timeout=math.inf, urgent=True)
-
-    async def taught_points(
-        self, mode: c.HHTTrigMode = c.HHTTrigMode.TRIGGERED_ON_KEY_RELEASED
-    ) -> AsyncIterator[c.Pose]:
-        """Yields the poses of hand-guided teaching (HHT): the user presses the key on the forearm, and guides the arm.
-
-        Args:
-            mode: A pose when the key is released, or at intervals while it is held. Manual 2.7.
-        """
-        await self.link.request(c.SET_HHT_TRIG_MODE, mode)
-        await self.link.request(c.SET_HHT_TRIG_OUTPUT_ENABLED, value=True)
-        try:
-            while True:
-                if await self.link.request(c.GET_HHT_TRIG_OUTPUT, None):
-                    yield await self.get_pose()
-
-                await anyio.sleep(TEACH_INTERVAL)
-        finally:
-            with suppress(DobotError):
-                await run_shielded(self.link.request(c.SET_HHT_TRIG_OUTPUT_ENABLED, value=False))
+        await self.queue.stop(timeout=timeout, tools=tools)
 
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, None]:
         """Do a command and return when it is done: a motion through the queue, anything else immediately."""
         if command.queueing is Queueing.ALWAYS:
             return run_owned(self.queue, self.link.cleanup, command, value, timeout)
 
-        return self.link.request(command, value, timeout=timeout)
+        return self._do(command, value, timeout)
+
+    async def perform_from_goal(self, plan: Plan, needs: Need, timeout: float | None) -> None:
+        """Do what a plan makes of the goal of what is queued before it, or of where the arm stands."""
+        timeout, loop = check_timeout(timeout), asyncio.get_running_loop()
+        started = loop.time()
+        command, value = await self.queue.planned(plan, needs)
+        left = None if timeout is None else max(0.0, timeout - (loop.time() - started))
+        await run_owned(self.queue, self.link.cleanup, command, value, left)
 
     async def greet(self, timeout: float) -> None:
         """Prove that an arm answers, with a read that tells its end effector, and ready its queue; for `connect`."""
         try:
             async with asyncio.timeout(timeout):
                 bias = await self.link.request(c.GET_END_EFFECTOR_PARAMS, None, timeout=timeout)
-                self.kinematics = Kinematics(bias.x_bias, bias.y_bias, bias.z_bias)
+                self.queue.kinematics = Kinematics(bias.x_bias, bias.y_bias, bias.z_bias)
+                self.queue.inherited = not self._fresh
                 if self._fresh:
                     await self._executor.clear()
                     await self._executor.space.read()
@@ -386,12 +298,18 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
 
     async def leave(self) -> None:
         """Stop the arm and everything on it, until it has heard that; for `connect`."""
-        stop = self.queue.begin_stop(MotionStopped("the connection's block was left by an error"))
-        await run_concurrently(*(self.link.request(row, value, timeout=math.inf, urgent=True) for row, value in TOOLS))
-        await stop
+        await self.queue.begin_stop(MotionStopped("the connection's block was left by an error"))
+
+    async def _do(self, command: Command[Q, Any], value: Q, timeout: float | None) -> None:
+        """Do a command that takes no time."""
+        check_ranges(value)
+        await self.queue.declared.check([value])
+        await self.link.request(command, value, timeout=timeout)
+        self.queue.declared.told(value)
 
     def _check(self, value: Any) -> None:
-        """Raise Unreachable for a target that the arm cannot reach, if it was asked to."""
+        """Raise ValueError for parameters with which no motion ends, or a target out of reach if that was asked for."""
+        check_ranges(value)
         if self._check_reach:
             check_target(self.kinematics, value)
 

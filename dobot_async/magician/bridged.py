@@ -17,8 +17,9 @@ from dobot_async.errors import ProtocolError
 from dobot_async.magician import alarms
 from dobot_async.magician import commands as c
 from dobot_async.magician import frame as f
-from dobot_async.magician.arm import BARRIERS, LEAVING
+from dobot_async.magician.arm import BARRIERS
 from dobot_async.magician.frame import Frame
+from dobot_async.magician.stopping import LEAVING, TOOLS
 from dobot_async.transports import Transport
 from dobot_async.wire import Command, Number, Queueing, u64
 
@@ -30,6 +31,7 @@ ACKNOWLEDGED = 1.0  # seconds within which the arm acknowledges a queued command
 PATIENCE = 1.5
 LITE_READS = {7, 33, 68, 69, 215}  # of the Magician Lite; they are in no public manual
 STOPS = {c.SET_QUEUED_CMD_STOP_EXEC.id, c.SET_QUEUED_CMD_FORCE_STOP_EXEC.id}
+TOOLS_OFF = {(row.id, row.request.encode(value)) for row, value in TOOLS}
 IDLE = c.SET_JOG_CMD.request.encode(c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE))[1:]
 MOTORS = {c.SET_E_MOTOR.id, c.SET_E_MOTOR_S.id}
 NO_DUTY = c.SET_IOPWM.request.encode(c.IOPWM(1, 1000.0, 0.0))[1:]
@@ -193,10 +195,13 @@ class BridgedMagician(ByKey[Frame]):
 
     def kind(self, request: Frame) -> Kind:
         """Returns what a request is."""
-        if request.id in STOPS or (
-            request.id == c.SET_JOG_CMD.id and request.write and not request.queued and request.params[1:] == IDLE
-        ):
+        now = request.write and not request.queued
+        ends_jog = request.id == c.SET_JOG_CMD.id and request.params[1:] == IDLE
+        if request.id in STOPS or (now and ends_jog):
             return Kind.STOP
+
+        if now and (request.id, request.params) in TOOLS_OFF:
+            return Kind.OFF
 
         known = (request.id, False) in c.BY_KEY or request.id in LITE_READS
         return Kind.READ if known and not request.write and not request.queued else Kind.WRITE
@@ -215,7 +220,7 @@ class BridgedMagician(ByKey[Frame]):
         """Returns whether it does no harm to send it again: never for what moves anything."""
         row = row_of(request)
         if row is None or request.queued or row.moves or row.id in MOTORS:
-            return self.kind(request) is Kind.STOP
+            return self.kind(request) in {Kind.STOP, Kind.OFF}
 
         return row.repeatable
 

@@ -109,7 +109,7 @@ GET_JOG_COORDINATE_PARAMS = read("GetJOGCoordinateParams", 71, JOGCoordinatePara
 SET_JOG_COMMON_PARAMS = write("SetJOGCommonParams", 72, JOGCommonParams, "2.10.3", ALLOWED)
 GET_JOG_COMMON_PARAMS = read("GetJOGCommonParams", 72, JOGCommonParams, "2.10.3")
 SET_JOG_CMD = write("SetJOGCmd", 73, JOGCmd, "2.10.4", ALLOWED, moves=True)
-SET_JOGL_PARAMS = write("SetJOGLParams", 74, JOGLParams, "V1.1")
+SET_JOGL_PARAMS = write("SetJOGLParams", 74, JOGLParams, "V1.1", ALLOWED)  # V1.1.5 has it queued
 GET_JOGL_PARAMS = read("GetJOGLParams", 74, JOGLParams, "V1.1")
 
 # 2.11 PTP
@@ -163,9 +163,9 @@ GET_IODI = ask("GetIODI", 133, IO_ADDRESS, IODI, "2.16.4", echo="address")
 GET_IOADC = ask("GetIOADC", 134, IO_ADDRESS, IOADC, "2.16.5", echo="address")
 SET_E_MOTOR = write("SetEMotor", 135, EMotor, "2.16.6", ALLOWED)
 SET_E_MOTOR_S = queued("SetEMotorS", 136, EMotorS, "V1.1")
-SET_COLOR_SENSOR = write("SetColorSensor", 137, Lenient(Record(ColorSensor), least=2), "V1.1")
+SET_COLOR_SENSOR = write("SetColorSensor", 137, Lenient(Record(ColorSensor), least=2), "V1.1", ALLOWED)
 GET_COLOR_SENSOR = read("GetColorSensor", 137, Color, "V1.1")
-SET_INFRARED_SENSOR = write("SetInfraredSensor", 138, Lenient(Record(InfraredSensor), least=2), "V1.1")
+SET_INFRARED_SENSOR = write("SetInfraredSensor", 138, Lenient(Record(InfraredSensor), least=2), "V1.1", ALLOWED)
 GET_INFRARED_SENSOR = ask("GetInfraredSensor", 138, INFRARED_PORT, Number[int](u8), "V1.1")
 
 # 2.17 Calibration

@@ -17,6 +17,7 @@ from dobot_async.magician.frame import Frame
 from dobot_async.magician.ledger import QueueLedger
 from dobot_async.magician.reach import destination
 from dobot_async.magician.status import SILENCE
+from dobot_async.magician.stopping import STILL, TOOLS
 from dobot_async.magician.submission import Submission, Surplus
 from dobot_async.wire import Command
 
@@ -27,11 +28,17 @@ ARRIVED = 0.5  # mm and degrees
 
 
 class MagicianExecutor(Submission):
-    """The arm's own queue, over a link; see `Executor`."""
+    """The arm's own queue, over a link; see `Executor`.
+
+    Attributes:
+        tool_stops: How many stops were to end laser and steppers so far.
+    """
 
     def __init__(self, link: Link[Frame], window: int, check: Callable[[Any], None]) -> None:
         super().__init__(link, window, check)
         self._approach = Approach(partial(self.status.ask, c.GET_POSE), asyncio.get_running_loop().time)
+        self.tool_stops = 0
+        self._tools_ended = 0
         self._downloading = False
 
     async def completed(self) -> int | None:
@@ -61,16 +68,25 @@ class MagicianExecutor(Submission):
         return target is not None and target.distance(await self.status.ask(c.GET_POSE)) < ARRIVED
 
     async def stop(self) -> None:
-        """Stop the arm where it is, jogs and a download included. Manual 2.19.3, 2.19.5 and 2.10.4."""
+        """Stop the arm where it is, jogs and a download included, and laser and steppers if that is wanted.
+
+        Manual 2.19.3, 2.19.5, 2.10.4, 2.9.2 and 2.16.6.
+        """
+        wanted = self.tool_stops
+        tools = TOOLS if wanted > self._tools_ended else ()
         commands: list[tuple[Command[Any, None], Any]] = [
             (c.SET_QUEUED_CMD_FORCE_STOP_EXEC, None),
-            (c.SET_JOG_CMD, c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE)),
+            (c.SET_JOG_CMD, STILL),
         ]
         if self._downloading:
             commands.append((c.SET_QUEUED_CMD_STOP_DOWNLOAD, None))
 
-        await run_concurrently(*(self._insist(command, value) for command, value in commands))
+        await run_concurrently(*(self._insist(command, value) for command, value in (*commands, *tools)))
         self._downloading = False
+        if tools:
+            # Again: a queued command may have switched one on before the arm heard that it is to stop.
+            await run_concurrently(*(self._insist(command, value) for command, value in tools))
+            self._tools_ended = max(self._tools_ended, wanted)
 
     async def clear(self) -> None:
         """Empty the arm's queue and let it run again. Manual 2.19.6 and 2.19.1."""

@@ -9,10 +9,13 @@ __all__ = ["FAMILY"]
 FAMILY = Family(
     public={
         "dobot_async.magician.alarms": ("Alarm",),
-        "dobot_async.magician.arm": ("DeviceInfo", "Jog", "Magician"),
+        "dobot_async.magician.arm": ("Magician",),
         "dobot_async.magician.effectors": ("Gripper", "Laser", "Pen", "SuctionCup"),
+        "dobot_async.magician.jogs": ("Jog",),
         "dobot_async.magician.kinematics": ("JointLimits", "Kinematics", "Unreachable"),
         "dobot_async.magician.params": (
+            "AccessoryVersion",
+            "Color",
             "ColorPort",
             "EndEffectorParams",
             "HHTTrigMode",
@@ -26,6 +29,7 @@ FAMILY = Family(
     simulator="dobot_async.simulator.magician:SimulatedMagician",
     bridge="dobot_async.magician.bridged:BRIDGED",
     discovery="dobot_async.discovery.families:MAGICIAN",
-    cli="dobot_async.cli.families:MAGICIAN",
+    cli="dobot_async.cli.arms.magician:MAGICIAN",
     fleet="dobot_async.fleet.families:MAGICIAN",
+    program="dobot_async.magician.vocabulary:VOCABULARY",
 )

@@ -62,8 +62,9 @@ class JointLimits:
     """Lowest and highest angle of each joint, in degrees.
 
     The defaults are the widest that any source states for a Magician, so that nothing is refused that some arm can do:
-    joints 1, 2 and 4 and the lower end of joint 3 as measured for magician_ros2, the upper end of joint 3 from the data
-    sheet (the measured 60 would forbid z < 0 near the base, where arms do work). With the default x_bias all places 200
+    joints 1, 2 and 4 and the lower end of joint 3 as measured for magician_ros2, the upper end of joint 3 from the
+    vendor's ALARM Description V1.0.1, table 3.4 (the measured 60 would forbid z < 0 near the base, where arms do work,
+    and one that was taught by hand stood at 85.3). With the default x_bias all places 200
     to 300 mm from the axis of joint 1 pass at z -50 to 100. Of the usual work area, x 150 to 300, y -150 to 150,
     z -50 to 150, what fails is high and near (the rear arm would lean back), far out in the corners (stretched), and
     the last few mm low and near.
@@ -79,7 +80,7 @@ class JointLimits:
 
     j1: tuple[float, float] = (-125.0, 125.0)
     j2: tuple[float, float] = (-5.0, 90.0)
-    j3: tuple[float, float] = (-15.0, 85.0)
+    j3: tuple[float, float] = (-15.0, 90.0)
     j4: tuple[float, float] = (-150.0, 150.0)
     fold: tuple[float, float] = (-70.0, 55.0)
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import re
-from collections.abc import AsyncIterator, Coroutine
+from collections.abc import AsyncIterator, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal, Self, TypeVar, cast
@@ -14,15 +13,17 @@ import anyio
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.queue.host import HostExecutor
-from dobot_async._core.util.arguments import check_duration
+from dobot_async._core.util.arguments import check_duration, check_timeout
 from dobot_async.arms.session import arm_session, check_options, run_owned
-from dobot_async.errors import ConnectionLost, MotionStopped, ProtocolError
+from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot import frame
 from dobot_async.mycobot.channel import Channel
 from dobot_async.mycobot.executor import CobotRunner, Tolerance
-from dobot_async.mycobot.models import AXES, DEFAULT, CobotModel, model_of
-from dobot_async.mycobot.opening import GAP, opened, silent, unlike, with_baud
+from dobot_async.mycobot.gripper import GRIPPER
+from dobot_async.mycobot.jog import jog_command, jogging
+from dobot_async.mycobot.models import DEFAULT, CobotModel, Range, model_of
+from dobot_async.mycobot.opening import BARRIERS, GAP, greet, opened, reply_times, with_baud
 from dobot_async.mycobot.queue import CobotQueue
 from dobot_async.mycobot.readings import Readings
 from dobot_async.mycobot.verbs import SPEED, Verbs
@@ -33,18 +34,9 @@ __all__ = ["BARRIERS", "GAP", "MyCobot", "opened", "with_baud"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-JOG = re.compile(rf"(?:j(?P<joint>[1-9])|(?P<axis>{'|'.join(sorted(AXES, key=len, reverse=True))}))(?P<way>[+-])")
 
-BARRIERS = (
-    c.IS_POWER_ON,
-    c.IS_CONTROLLER_CONNECTED,
-    c.IS_FREE_MODE,
-    c.GET_SPEED,
-    c.GET_REFERENCE_FRAME,
-    c.GET_MOVEMENT_TYPE,
-    c.GET_END_TYPE,
-)
-"""Cheap reads of all models, used as barriers: the answer to one proves that earlier requests will not be answered."""
+TOLERANCE: Tolerance = (4.0, 8.0)
+"""Half as much again as the worst that users report of a 280: 2.6 degrees, and 4.3 mm along an axis."""
 
 
 class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
@@ -65,11 +57,12 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         acknowledges: bool,
         tolerance: Tolerance,
         fresh: bool = False,
+        patience: float = 0.0,
     ) -> None:
         self.link = link
         self._model = model
         self._fresh = fresh
-        self._channel = Channel(link, model, acknowledges=acknowledges)
+        self._channel = Channel(link, model, acknowledges=acknowledges, patience=patience)
         self._runner = CobotRunner(self._channel, tolerance)
         self._executor = HostExecutor(self._runner, link.cleanup)
         self.queue = CobotQueue(self._executor, model)
@@ -93,9 +86,10 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         timeout: float = 5.0,
         on_error: Literal["stop", "leave"] = "stop",
         reconnect: bool = False,
-        reply_timeout: float | tuple[float, float] = (0.05, 0.5),
+        reply_timeout: float | tuple[float, float] | None = None,
         acknowledges: bool | None = None,
-        tolerance: Tolerance = (2.0, 5.0),
+        tolerance: Tolerance = TOLERANCE,
+        limits: Mapping[str, Range] | None = None,
         gap: float = GAP,
     ) -> AsyncIterator[Self]:
         """Connect to an arm for the length of a block.
@@ -104,7 +98,8 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
 
         Args:
             url: `serial:///dev/ttyUSB0`, `tcp://host:port`, `sim:`.
-            model: "myarm300", "mycobot280", "mycobot280pi", "mycobot320", "mecharm270" or "mypalletizer260".
+            model: "myarm300", "mycobot280" (or "mycobot"), "mycobot280pi", "mycobot320", "mecharm270" or
+                "mypalletizer260".
             control: False for observers: only reads are sent, everything else raises ValueError.
             queue: "fresh" stops what an earlier program left moving; "keep" leaves it as found.
             timeout: Seconds until an arm must have answered.
@@ -112,9 +107,13 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
                 finish the motion that it does.
             reconnect: Reopen a link that breaks. The arm goes on with its motion meanwhile, and is watched again after.
             reply_timeout: Seconds without an answer after which a request is sent again: the least and the most that it
-                may adapt itself to, or one fixed value.
+                may adapt itself to, or one fixed value. By default (0.05, 0.5); on `tcp:` (0.7, 1.5), for the vendor's
+                server may take half a second for one answer, and a second request meanwhile spoils its order.
             acknowledges: Whether the firmware answers commands; None as the model does, and it is found out anyway.
-            tolerance: How near a motion has to come to count as done: degrees, and mm.
+            tolerance: How near a motion has to come to count as done: degrees, and mm. An arm that is told to go
+                elsewhere within it counts as there already.
+            limits: Ranges of your own beside the model's, by joint and axis: `{"j2": (-90, 90), "z": (20, 400)}`.
+                Degrees and mm; what a motion names is checked before it is sent.
             gap: Seconds between two frames.
 
         Raises:
@@ -123,7 +122,8 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
             MotionStopped: The block has ended without an error, and motions were still waiting in the queue on this
                 side: they were never sent.
         """
-        arm_model = model_of(model)
+        arm_model = model_of(model).limited(limits or {})
+        reply_timeout = reply_times(url) if reply_timeout is None else reply_timeout
         timeout = check_options(queue, on_error, timeout, reply_timeout)
         gap = check_duration(gap, "gap")
         if len(tolerance) != 2 or not min(check_duration(each, "tolerance") for each in tolerance) > 0:
@@ -150,6 +150,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
             acknowledges=arm_model.acknowledges if acknowledges is None else acknowledges,
             tolerance=tolerance,
             fresh=control and queue == "fresh",
+            patience=floor,
         )
         async with arm_session(
             with_baud(url, arm_model.baud),
@@ -196,17 +197,30 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         await self._channel.tell(c.CLEAR_ERROR_INFORMATION, None, timeout=timeout)
 
     async def recover(self) -> None:
-        """Empty the queue, clear the alarms and power the arm on: it is ready for new commands."""
+        """Empty the queue, clear the alarms and power the arm on: it is ready for new commands.
+
+        Raises:
+            ArmAlarm: Something still keeps it from moving.
+        """
         await self.queue.clear()
         await self.clear_alarms()
         await self.power_on()
+        await self._runner.raise_joint_alarms()
 
     async def pause(self) -> None:
-        """Let the arm wait where it is, in the middle of a motion."""
+        """Let the arm wait where it is, in the middle of a motion; returns when it says that it does.
+
+        Raises:
+            CommandRejected: It answers, and goes on.
+        """
         await self.queue.pause()
 
     async def resume(self) -> None:
-        """Let a paused arm go on."""
+        """Let a paused arm go on; returns when it says that it does.
+
+        Raises:
+            CommandRejected: It answers, and stays paused.
+        """
         await self.queue.resume()
 
     async def stop(self, *, timeout: float = 5.0) -> None:
@@ -226,9 +240,13 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         """Jog for a time, then stop.
 
         Args:
-            direction: j1+ j1- ... for a joint, x+ x- y+ y- z+ z- rx+ rx- ry+ ry- rz+ rz- for the tool.
+            direction: j1+ j1- ... for a joint, x+ x- y+ y- z+ z- rx+ rx- ry+ ry- rz+ rz- for the tool, as far as the
+                model has them.
             seconds: How long, finite and not negative.
             speed: Percent.
+
+        Raises:
+            DobotError: As `jogging`.
         """
         seconds = check_duration(seconds)
         async with self.jogging(direction, speed=speed):
@@ -238,18 +256,23 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
     async def jogging(self, direction: str, *, speed: int = SPEED) -> AsyncIterator[None]:
         """Jog until the block ends, however it ends; the stop is repeated until the arm says that it stands.
 
+        A block that ends well is followed by an error if the arm did not jog until its end.
+
         Args:
             direction: As for `jog`.
             speed: Percent.
 
         Raises:
+            ValueError: There is no such direction; the message lists those of this model.
+            CommandRejected: The arm did not move, or motions of the queue are under way.
+            MotionStopped: It came to rest before the end, at a limit or at the end of its reach.
+            ArmAlarm: A joint keeps it from moving.
             ReplyTimeout: The arm does not answer when it is to begin, or when it is to stop.
         """
-        command, value = self._jog(direction, speed)
-        self.link.frame(self._model.row(command), value)
-        self._model.check(command, value)
-        async with self.link.cleanup.at_end(self._runner.stop, "the end of the jog"):
-            await self._channel.tell(command, value)
+        jog = jog_command(self._model, direction, speed)
+        self.link.frame(self._model.row(jog[0]), jog[1])
+        await self.queue.update()
+        async with jogging(self._channel, self._runner, direction, jog, lambda: self.queue.pending):
             yield
 
     async def jog_stop(self) -> None:
@@ -258,39 +281,34 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
 
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, None]:
         """Do a command and return when it is done: a motion through the queue, anything else immediately."""
+        if command in GRIPPER:
+            return self._grip(command, value, timeout)
+
         if command.queueing is Queueing.ALWAYS:
             return run_owned(self.queue, self.link.cleanup, command, value, timeout)
 
-        return self._channel.tell(command, value, timeout=timeout)
+        return self._tell(command, value, timeout)
+
+    async def _tell(self, command: Command[Q, None], value: Q, timeout: float | None) -> None:
+        """Do what is no motion."""
+        await self._channel.tell(command, value, timeout=timeout)
+
+    async def _grip(self, command: Command[Any, None], value: Any, timeout: float | None) -> None:
+        """Close or open the gripper, and return when it rests."""
+        entry, timeout = self._runner.prepare(command, value), check_timeout(timeout)
+        try:
+            async with asyncio.timeout(timeout):
+                await self._runner.run(entry)
+        except TimeoutError as error:
+            if isinstance(error, DobotError):
+                raise
+
+            raise ReplyTimeout(f"the gripper was not seen to be done within {timeout:.3g} s; it may go on") from None
 
     async def greet(self, timeout: float) -> None:
         """Prove that an arm answers, and as its model does, and stop it if that was asked for; for `connect`."""
-        powered = None
-        try:
-            async with asyncio.timeout(timeout):
-                powered = await self._channel.ask(c.IS_POWER_ON, None, timeout=timeout)
-                if powered:
-                    await self._channel.ask(c.GET_ANGLES, None)
-
-                if self._fresh:
-                    await self._runner.stop()
-        except (TimeoutError, ProtocolError, ConnectionLost) as error:
-            raise (silent if powered is None else unlike)(self.link, self._model) from error
+        await greet(self._channel, timeout, stop=self._fresh)
 
     async def leave(self) -> None:
         """Stop the arm, until it says that it stands; for `connect`."""
         await self.queue.begin_stop(MotionStopped("the connection's block was left by an error"))
-
-    def _jog(self, direction: str, speed: int) -> tuple[Command[Any, None], c.JogJoint | c.JogAxis]:
-        """The command of a jog."""
-        found = JOG.fullmatch(direction)
-        if not found:
-            raise ValueError(
-                f"a direction is j1+ j1- ... or {' '.join(f'{axis}+' for axis in AXES)} ..., not {direction!r}"
-            )
-
-        way = c.Direction.UP if found["way"] == "+" else c.Direction.DOWN
-        if found["joint"]:
-            return c.JOG_ANGLE, c.JogJoint(int(found["joint"]), way, speed)
-
-        return c.JOG_COORD, c.JogAxis(AXES.index(found["axis"]) + 1, way, speed)

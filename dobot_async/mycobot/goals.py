@@ -7,7 +7,7 @@ from typing import Any
 
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.channel import Channel
-from dobot_async.mycobot.watch import Goal
+from dobot_async.mycobot.watch import STILL, Goal
 from dobot_async.wire import Command
 
 __all__ = ["GOALS", "Goals"]
@@ -17,6 +17,8 @@ STEPS = 4096 / 360  # of an encoder, in a degree
 
 class Goals:
     """Make the goals of one arm's motions; what is relative is told from where the arm stands now.
+
+    They raise ValueError for a step that leads out of the model's range.
 
     Attributes:
         channel: The arm.
@@ -43,8 +45,10 @@ class Goals:
 
     async def joint_step(self, value: c.JointMove) -> Goal:
         """One joint, from where it is now."""
-        here = await self.channel.poll(c.GET_ANGLES)
-        return self.joints({value.joint - 1: here[value.joint - 1] + value.angle})
+        here = await self.channel.poll(c.GET_ANGLES, None)
+        target = here[value.joint - 1] + value.angle
+        self.channel.model.check_joint(value.joint, target)
+        return self.joints({value.joint - 1: target})
 
     def coords(self, expected: Mapping[int, float]) -> Goal:
         """Coordinates, by their places."""
@@ -63,8 +67,12 @@ class Goals:
 
     async def coord_step(self, value: c.CoordStep) -> Goal:
         """One coordinate, from where it is now."""
-        here = await self.channel.poll(c.GET_COORDS)
-        return self.coords({value.axis - 1: here[value.axis - 1] + value.value})
+        here = await self.channel.poll(c.GET_COORDS, None)
+        target = here[value.axis - 1] + value.value
+        if value.axis <= 3:  # angles go round
+            self.channel.model.check_coord(value.axis, target)
+
+        return self.coords({value.axis - 1: target})
 
     async def solution(self, value: c.SetSolutionAngle) -> Goal:
         """The elbow of an arm with 7 joints."""
@@ -72,13 +80,11 @@ class Goals:
 
     async def encoders(self, value: c.SetEncoder | c.SetEncoders | c.SetEncodersDrag) -> Goal:
         """Servos."""
-        if isinstance(value, c.SetEncoder):
-            # Beyond the joints is the gripper, whose position is not among those that are read.
-            expected = {value.joint - 1: value.encoder} if value.joint <= self.channel.model.joints else {}
-        else:
-            expected = dict(enumerate(value.encoders))
+        tolerances, still = [self.degrees * STEPS], STILL * STEPS
+        if isinstance(value, c.SetEncoder):  # it may be the gripper's, which is not among those that are read together
+            return Goal(c.GET_ENCODER, {0: value.encoder}, tolerances, still, of=value.joint)
 
-        return Goal(c.GET_ENCODERS, expected, [self.degrees * STEPS], still=0.2 * STEPS)
+        return Goal(c.GET_ENCODERS, dict(enumerate(value.encoders)), tolerances, still)
 
 
 GOALS: Mapping[Command[Any, Any], Callable[[Goals, Any], Awaitable[Goal]]] = {

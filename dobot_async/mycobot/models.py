@@ -13,6 +13,7 @@ joints, and with its own ID where that differs.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,9 +21,12 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
+from dobot_async._core.util.arguments import to_float
 from dobot_async.mycobot import commands as c
+from dobot_async.mycobot.checks import check
 from dobot_async.mycobot.frame import Known
 from dobot_async.mycobot.layouts import Many
+from dobot_async.mycobot.pose import AXES
 from dobot_async.mycobot.variants import PositionLayout
 from dobot_async.wire import Command, Layout
 
@@ -32,10 +36,8 @@ Q = TypeVar("Q")
 R = TypeVar("R")
 Range = tuple[float, float]
 Dialect = Mapping[Command[Any, Any], Mapping[str, Any]]
-AXES = ("x", "y", "z", "rx", "ry", "rz")
-DEFAULT = "mycobot280"
+FAMILY, DEFAULT = "mycobot", "mycobot280"
 TURN: Range = (-180.0, 180.0)
-ACKNOWLEDGED = frozenset({0, 1})
 SENTINEL = 180.08
 """What all joints are reported to be, with either sign, by an Atom that cannot read its servos."""
 
@@ -54,6 +56,7 @@ class CobotModel:
         acknowledges: Whether its newer firmware answers commands; older firmware of any model does not.
         joint_speed: Degrees/s at 100 percent; none is documented but that of the myCobot 280.
         baud: Of its serial port.
+        gripper: The number of its gripper's servo.
     """
 
     name: str
@@ -65,6 +68,7 @@ class CobotModel:
     acknowledges: bool = True
     joint_speed: float = 150.0
     baud: int = 115200
+    gripper: int = 7
 
     @property
     def joints(self) -> int:
@@ -78,11 +82,21 @@ class CobotModel:
 
         return cast("Command[Q, R]", self.rows[command])
 
-    def check_joint(self, joint: int, angle: float) -> None:
-        """Raise ValueError for a joint that it does not have, or an angle beyond the joint's limits."""
+    def check_servo(self, servo: int) -> None:
+        """Raise ValueError for a servo that it does not have: there are those of the joints and the gripper's."""
+        if not 1 <= servo <= self.joints and servo != self.gripper:
+            raise ValueError(
+                f"a {self.title} has the servos 1 to {self.joints}, and {self.gripper} of its gripper, not {servo}"
+            )
+
+    def check_has_joint(self, joint: int) -> None:
+        """Raise ValueError for a joint that it does not have."""
         if not 1 <= joint <= self.joints:
             raise ValueError(f"a {self.title} has joints 1 to {self.joints}, not {joint}")
 
+    def check_joint(self, joint: int, angle: float) -> None:
+        """Raise ValueError for a joint that it does not have, or an angle beyond the joint's limits."""
+        self.check_has_joint(joint)
         low, high = self.joint_limits[joint - 1]
         if not low <= angle <= high:
             raise ValueError(f"joint {joint} must be in {low:g} to {high:g} degrees, not {angle!r}")
@@ -100,22 +114,40 @@ class CobotModel:
             raise ValueError(f"a {self.title} has the axes 1 to {len(self.reach)}, not {axis}")
 
     def check(self, command: Command[Any, Any], value: Any) -> None:
-        """Raise ValueError for the parameters of a motion that this model cannot do, whatever its pose."""
-        match value:
-            case c.JointMove() if command is not c.JOG_INCREMENT:
-                self.check_joint(value.joint, value.angle)
-            case c.JointMove() | c.JogJoint():
-                self.check_joint(value.joint, 0.0)
-            case c.JogAxis() | c.CoordStep():
-                self.check_axis(value.axis)
-            case c.JointsMove():
-                for joint, angle in enumerate(value.angles, 1):
-                    self.check_joint(joint, angle)
-            case c.ToMove():
-                for axis, coord in enumerate(value.coords, 1):
-                    self.check_coord(axis, coord)
-            case c.CoordMove():
-                self.check_coord(value.axis, value.value)
+        """Raise ValueError for parameters of a command that this model cannot do, whatever its pose."""
+        check(self, command, value)
+
+    def limited(self, limits: Mapping[str, Range]) -> CobotModel:
+        """Return this model with limits of the user's own, by the words j1, j2 ... and x, y, z, rx, ry, rz.
+
+        Raises:
+            ValueError: There is no such joint or axis, or the numbers are no range.
+            TypeError: They are no numbers.
+        """
+        if not limits:
+            return self
+
+        found = dict(zip(self.words, (*self.joint_limits, *self.reach), strict=True))
+        for word, each in limits.items():
+            if word not in found:
+                raise ValueError(f"limits: a {self.title} has {', '.join(found)}, not {word!r}")
+
+            if not isinstance(each, Iterable):
+                raise TypeError(f"limits: {word} must have a least and a greatest value, not {each!r}")
+
+            ends = [to_float(end, f"limits of {word}") for end in each]
+            if not (len(ends) == 2 and all(map(math.isfinite, ends)) and ends[0] < ends[1]):
+                raise ValueError(f"limits: {word} must have a least and a greatest value, finite, not {each!r}")
+
+            found[word] = ends[0], ends[1]
+
+        values = tuple(found.values())
+        return replace(self, joint_limits=values[: self.joints], reach=values[self.joints :])
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Its joints and axes by name: j1, j2, ... x, y, z, rx, ..."""
+        return (*(f"j{joint}" for joint in range(1, self.joints + 1)), *AXES[: len(self.reach)])
 
     @cached_property
     def rows(self) -> Mapping[Command[Any, Any], Command[Any, Any]]:
@@ -195,6 +227,7 @@ MODELS: Mapping[str, CobotModel] = MappingProxyType(
                 dialect=OF_MYARM,
                 lacks=NEWER,
                 acknowledges=False,
+                gripper=8,
             ),
             MYCOBOT_280,
             replace(MYCOBOT_280, name="mycobot280pi", title="myCobot 280 Pi", baud=1_000_000),
@@ -230,8 +263,11 @@ MODELS: Mapping[str, CobotModel] = MappingProxyType(
 
 
 def model_of(name: str) -> CobotModel:
-    """Return the model of a name; raise ValueError that lists them."""
+    """Return the model of a name, the usual one for the family's; raise ValueError that lists them."""
+    if name == FAMILY:
+        name = DEFAULT
+
     if name not in MODELS:
-        raise ValueError(f"no model {name!r}; there are: {', '.join(MODELS)}")
+        raise ValueError(f"no model {name!r}; there are: {', '.join((FAMILY, *MODELS))}")
 
     return MODELS[name]

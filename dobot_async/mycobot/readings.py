@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from dobot_async._core.util.arguments import check_timeout
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.errors import ArmAlarm, CommandRejected, DobotError, ReplyTimeout
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.alarms import SERVO_LOSS, CobotAlarm
 from dobot_async.mycobot.channel import Channel
 from dobot_async.mycobot.executor import CobotRunner
+from dobot_async.mycobot.gripper import check_gripper
+from dobot_async.mycobot.pose import CobotPose
 from dobot_async.mycobot.watch import cannot_read_servos
 from dobot_async.wire import Command
 
@@ -21,22 +24,6 @@ __all__ = ["CobotInfo", "CobotPose", "Readings"]
 Q = TypeVar("Q")
 POLL = 0.05
 POWER_TIME = 3.0
-
-
-@dataclass(frozen=True, slots=True)
-class CobotPose:
-    """Where the tool is (mm), how it is turned (degrees), and the joints (degrees).
-
-    A 4-axis arm has no ry and rz, and tells its one angle as rx.
-    """
-
-    x: float
-    y: float
-    z: float
-    rx: float
-    ry: float
-    rz: float
-    joints: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +48,12 @@ class Readings:
         self._channel = channel
         self._runner = runner
 
-    async def get_angles(self, *, timeout: float | None = None) -> tuple[float, ...]:
+    async def get_joints(self, *, timeout: float | None = None) -> tuple[float, ...]:
         """Return the joints, degrees; raise ArmAlarm if the arm cannot read its servos."""
+        return await self.get_angles(timeout=timeout)
+
+    async def get_angles(self, *, timeout: float | None = None) -> tuple[float, ...]:
+        """Return the joints: `get_joints` under the vendor's name."""
         return believed(await self._channel.ask(c.GET_ANGLES, None, timeout=timeout))
 
     async def get_coords(self, *, timeout: float | None = None) -> c.Coords:
@@ -71,7 +62,7 @@ class Readings:
 
     async def get_pose(self, *, timeout: float | None = None) -> CobotPose:
         """Return tool and joints; of one moment if the firmware knows GetAnglesCoords, else one after the other."""
-        both = await self._channel.ask_if_known(c.GET_ANGLES_COORDS, timeout)
+        both = await self._channel.ask_if_known(c.GET_ANGLES_COORDS, None, timeout)
         if both is None:
             coords, joints = await self.get_coords(timeout=timeout), await self.get_angles(timeout=timeout)
         else:
@@ -79,10 +70,15 @@ class Readings:
 
         return CobotPose(coords.x, coords.y, coords.z, coords.rx, coords.ry, coords.rz, joints)
 
-    async def get_info(self, *, timeout: float | None = None) -> CobotInfo:
+    async def get_info(self, *, timeout: float | None = None) -> DeviceInfo:
+        """Return who the arm is: the version of its firmware, where that tells it, for it has no number or name."""
+        version: float | None = await self._channel.ask_if_known(c.GET_SYSTEM_VERSION, None, timeout)
+        return DeviceInfo(serial_number="", name="", version="" if version is None else f"{version:.1f}")
+
+    async def get_versions(self, *, timeout: float | None = None) -> CobotInfo:
         """Return the model and the versions of its firmware."""
-        system: float | None = await self._channel.ask_if_known(c.GET_SYSTEM_VERSION, timeout)
-        basic: float | None = await self._channel.ask_if_known(c.GET_BASIC_VERSION, timeout)
+        system: float | None = await self._channel.ask_if_known(c.GET_SYSTEM_VERSION, None, timeout)
+        basic: float | None = await self._channel.ask_if_known(c.GET_BASIC_VERSION, None, timeout)
         return CobotInfo(
             model=self._channel.model.title,
             system_version=system,
@@ -144,8 +140,8 @@ class Readings:
         return bool((await self._channel.ask(row, pin, timeout=timeout)).level)
 
     async def get_gripper(self, *, kind: c.GripperType | None = None, timeout: float | None = None) -> int:
-        """Return how far the gripper is open, 0 to 100 percent."""
-        return await self._channel.ask(c.GET_GRIPPER_VALUE, kind, timeout=timeout)
+        """Return how far the gripper is open, 0 to 100 percent; raise CommandRejected if no gripper answers the arm."""
+        return check_gripper(await self._channel.ask(c.GET_GRIPPER_VALUE, kind, timeout=timeout))
 
     async def get_encoders(self, *, timeout: float | None = None) -> tuple[int, ...]:
         """Return the positions of the servos, 0 to 4096."""

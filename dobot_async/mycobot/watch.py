@@ -21,7 +21,7 @@ from typing import Any
 from dobot_async.mycobot.models import SENTINEL
 from dobot_async.wire import Command
 
-__all__ = ["Goal", "Verdict", "Watch", "cannot_read_servos", "turned"]
+__all__ = ["STILL", "Goal", "Verdict", "Watch", "cannot_read_servos", "turned"]
 
 LOOKS = 3  # in a row, all of them still, of an arm that was not seen to move
 MOVED, FAST = 2, 1  # the same for one that has moved, and for one that was so fast that it cannot be creeping
@@ -52,14 +52,16 @@ class Goal:
         still: How far the numbers may go and the arm still counts as standing.
         rotation: Whether places 3 to 5 are a rotation, of which several triples of angles may be the same.
         round: Places of angles that are the same after a whole turn.
+        of: The parameters of `read`.
     """
 
-    read: Command[None, Any]
+    read: Command[Any, Any]
     expected: Mapping[int, float]
     tolerances: Sequence[float]
     still: float = STILL
     rotation: bool = False
     round: frozenset[int] = frozenset()
+    of: Any = None
 
     def missed(self, here: Sequence[float]) -> float:
         """Return by how much the goal is missed, in the unit of the worst place; 0 within the tolerances."""

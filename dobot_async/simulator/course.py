@@ -17,6 +17,8 @@ from dobot_async.simulator.work import INSTANT, Activity, DeviceOptions, Execute
 
 __all__ = ["Course"]
 
+MOMENT = 0.005  # seconds to both sides over which a speed is taken
+
 
 @dataclass(slots=True)
 class Active:
@@ -102,6 +104,22 @@ class Course:
         return next((found for found in map(self._joints_of, self.active) if found is not None), self._resting)
 
     @property
+    def joint_speeds(self) -> Vector:
+        """How fast the joints turn, from where they are a moment before and after now."""
+        still = (0.0,) * len(self._resting)
+        if self.frozen_at is not None:
+            return still
+
+        for active in self.active:
+            elapsed = self.time - active.origin
+            ends = max(elapsed - MOMENT, 0.0), elapsed + MOMENT
+            before, after = map(active.activity.at, ends)
+            if before is not None and after is not None:
+                return tuple((b - a) / (ends[1] - ends[0]) for a, b in zip(before, after, strict=True))
+
+        return still
+
+    @property
     def left(self) -> int:
         """How many commands the queue can take."""
         counted = self._options.count_executing and self.running is not None
@@ -168,6 +186,19 @@ class Course:
             if wanted and (active.work.moves or not moving_only):
                 self._leave(active, None)
                 self.record(active.work, active.index, active.started, outcome)
+
+    def replace(self, work: Work) -> bool:
+        """Ends the motions that go on, and begins a work in their place; False if anything else goes on."""
+        busy, self._busy = self._busy, True  # nothing else begins between the two
+        try:
+            self.interrupt("aborted", moving_only=True)
+            if self.active or self.frozen_at is not None:
+                return False
+
+            self.aside = self.begin(work)
+            return True
+        finally:
+            self._busy = busy
 
     def thaw(self) -> None:
         """Lets time go on for all that goes on."""

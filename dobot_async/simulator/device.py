@@ -69,6 +69,12 @@ class Device:
         return self._course.joints
 
     @property
+    def joint_speeds(self) -> Vector:
+        """How fast the joints turn, degrees/s."""
+        self.advance()
+        return self._course.joint_speeds
+
+    @property
     def moving(self) -> bool:
         """Whether a motion goes on, in the queue or beside it."""
         self.advance()
@@ -208,6 +214,13 @@ class Device:
         self._course.aside = self._course.begin(work)
         self._course.settle()
         return True
+
+    def replace(self, work: Work) -> bool:
+        """Begins an immediate motion in place of the one that goes on; False, without effect, beside anything else."""
+        self.advance()
+        begun = self._course.replace(work)
+        self._course.settle()
+        return begun
 
     def end_aside(self) -> None:
         """Ends a jog where the arm is, as a key that is let go does."""

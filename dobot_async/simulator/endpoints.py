@@ -9,14 +9,15 @@ calls, and the arm answers.
 from __future__ import annotations
 
 import asyncio
+import inspect
 import itertools
 import math
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
 from functools import partial
 from random import Random
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, overload
 from urllib.parse import SplitResult, urlsplit
 from weakref import WeakValueDictionary
 
@@ -25,24 +26,42 @@ import anyio
 from dobot_async.errors import ConnectFailed
 from dobot_async.families import Parts
 from dobot_async.simulator.faults import MEANS, PROBABILITIES, TIMES, Channel, Faults, LineState
-from dobot_async.transports.base import MANY, Transport, options
+from dobot_async.transports.base import MANY, Option, Transport, options
 from dobot_async.transports.baud import AtBaud
 from dobot_async.transports.listen import on_tcp, on_udp
 from dobot_async.transports.terminal import on_pty
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    from dobot_async.simulator.magician import SimulatedMagician
+    from dobot_async.simulator.mycobot import SimulatedMyCobot
+    from dobot_async.simulator.ultraarm import SimulatedUltraArm
+
+    A = TypeVar("A", default=Any)
+else:
+    from typing import TypeVar
+
+    A = TypeVar("A")
+
 __all__ = ["MODELS", "Simulation", "open_url", "simulate"]
+
+MyCobotModel = Literal[
+    "mycobot", "myarm300", "mycobot280", "mycobot280pi", "mycobot320", "mecharm270", "mypalletizer260"
+]
 
 MODELS: Parts[Callable[..., Any]] = Parts("simulator")
 """The simulated arms by name: each is made with a clock, and has a `session()` for each client."""
 BLE_OPTIONS = {"name": str, "address": str, "interval": float, "mtu": int, "packets": int}
 PTY_OPTIONS = {"baud": int}
 FAULT_OPTIONS = dict.fromkeys((*PROBABILITIES, *TIMES, *MEANS), float)
+HOMING = {"homed": Option(lambda text: bool(("false", "true").index(text)), "true or false")}
 SILENCE = 1.0  # seconds after which a client that cannot be seen to leave counts as another one
 BUFFER = 1 << 16
 LEAST_REORDER_WINDOW = 0.005
 
 names = itertools.count(1)
-running: WeakValueDictionary[str, Simulation] = WeakValueDictionary()
+running: WeakValueDictionary[str, Simulation[Any]] = WeakValueDictionary()
 """The simulations of this process, by the host of their `sim://` URLs."""
 
 
@@ -65,8 +84,8 @@ class Lapse:
         return (self._now() - self._started) * self.speed
 
 
-class Simulation:
-    """A simulated arm that can be reached.
+class Simulation(Generic[A]):
+    """A simulated arm that can be reached; A is its class, such as SimulatedMagician.
 
     Attributes:
         url: What to connect to.
@@ -76,7 +95,7 @@ class Simulation:
         outages: When a stall or a silence that was drawn began on a line, and when it ends, in the loop's seconds.
     """
 
-    def __init__(self, arm: Any, faults: Faults, seed: int | None) -> None:
+    def __init__(self, arm: A, faults: Faults, seed: int | None) -> None:
         self.url = ""
         self.arm = arm
         self.faults = faults
@@ -97,8 +116,9 @@ class Simulation:
         name: str = "",  # noqa: ARG002 - an arm tells of nobody
     ) -> Client:
         """Called by an endpoint: somebody has connected, and takes replies by `deliver`."""
+        arm: Any = self.arm
         client = Client(
-            self.arm.session,
+            arm.session,
             self.faults,
             self._random,
             deliver,
@@ -211,6 +231,52 @@ class Client:
             self._back.send(replies)
 
 
+@overload
+def simulate(
+    model: Literal["magician"] = "magician",
+    *,
+    listen: str = ...,
+    speed: float = ...,
+    seed: int | None = ...,
+    faults: Faults | None = ...,
+    clock: Callable[[], float] | None = ...,
+    **details: Any,
+) -> AbstractAsyncContextManager[Simulation[SimulatedMagician]]: ...
+@overload
+def simulate(
+    model: MyCobotModel,
+    *,
+    listen: str = ...,
+    speed: float = ...,
+    seed: int | None = ...,
+    faults: Faults | None = ...,
+    clock: Callable[[], float] | None = ...,
+    **details: Any,
+) -> AbstractAsyncContextManager[Simulation[SimulatedMyCobot]]: ...
+@overload
+def simulate(
+    model: Literal["ultraarm"],
+    *,
+    listen: str = ...,
+    speed: float = ...,
+    seed: int | None = ...,
+    faults: Faults | None = ...,
+    clock: Callable[[], float] | None = ...,
+    **details: Any,
+) -> AbstractAsyncContextManager[Simulation[SimulatedUltraArm]]: ...
+@overload
+def simulate(
+    model: str,
+    *,
+    listen: str = ...,
+    speed: float = ...,
+    seed: int | None = ...,
+    faults: Faults | None = ...,
+    clock: Callable[[], float] | None = ...,
+    **details: Any,
+) -> AbstractAsyncContextManager[Simulation[Any]]: ...
+
+
 @asynccontextmanager
 async def simulate(
     model: str = "magician",
@@ -221,7 +287,7 @@ async def simulate(
     faults: Faults | None = None,
     clock: Callable[[], float] | None = None,
     **details: Any,
-) -> AsyncIterator[Simulation]:
+) -> AsyncIterator[Simulation[Any]]:
     """Runs a simulated arm for the length of a block.
 
     Args:
@@ -233,7 +299,7 @@ async def simulate(
         seed: Of the faults.
         faults: What the line does to messages.
         clock: Simulated seconds; by default the event loop's own time, times `speed`.
-        details: What else the model takes: `options`, `quirks`.
+        details: What else the model takes: `options`, `quirks`; a Magician also `limits` and `homed`.
 
     Raises:
         ValueError: No such model, or no such place to listen at.
@@ -382,7 +448,11 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:
 
         return MemoryTransport(simulation)
 
-    given = options(url, {"speed": float, "seed": int, **FAULT_OPTIONS})
+    homing = "homed" in inspect.signature(MODELS[arm]).parameters if arm in MODELS else False
+    given = options(url, {"speed": float, "seed": int, **FAULT_OPTIONS, **(HOMING if homing else {})})
+    if homing:
+        given.setdefault("homed", True)  # for first steps; `simulate()` makes an arm as it is after power-up
+
     faults = Faults(**{name: given.pop(name) for name in FAULT_OPTIONS if name in given})
     async with AsyncExitStack() as stack:
         simulation = await stack.enter_async_context(simulate(arm, faults=faults, **given))

@@ -10,6 +10,8 @@ not fit are left unanswered; so is an unknown command, which also sets alarm 0x0
 
 from __future__ import annotations
 
+import math
+import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -21,11 +23,15 @@ from dobot_async.magician.frame import WRITE, Frame, Parser, encode
 from dobot_async.magician.kinematics import JointLimits
 from dobot_async.simulator.device import DeviceOptions, Work
 from dobot_async.simulator.magician_body import MAGICIAN, MagicianBody, Program
+from dobot_async.simulator.magician_state import REACH
 from dobot_async.wire import Command, Number, u64
 
 __all__ = ["MAGICIAN", "Counters", "Program", "Quirks", "Session", "SimulatedMagician"]
 
 UNKNOWN_COMMAND = 0x01
+NO_NUMBER = struct.pack("<f", math.nan)
+"""What an arm without a rail tells of its place there."""
+
 INDEX: Number[int] = Number(u64)
 
 
@@ -73,7 +79,7 @@ class Counters:
 
 
 class SimulatedMagician(MagicianBody):
-    """One arm, switched on in the home pose, and its protocol.
+    """One arm, switched on where it believes to stand in the home pose, and its protocol.
 
     Attributes:
         quirks: What is known to differ between firmwares.
@@ -87,6 +93,7 @@ class SimulatedMagician(MagicianBody):
         quirks: Quirks = Quirks(),
         *,
         limits: JointLimits | None = None,
+        homed: bool = False,
     ) -> None:
         """Switches an arm on.
 
@@ -95,8 +102,9 @@ class SimulatedMagician(MagicianBody):
             options: The capacity of the queue, its first index, what an alarm does, ...
             quirks: What this arm's firmware does differently.
             limits: How far the joints go.
+            homed: Whether it knows where it is, as after `home()`. A real arm does not know after power-up.
         """
-        super().__init__(clock, options, limits or JointLimits())
+        super().__init__(clock, options, limits or REACH, homed=homed)
         self.quirks = quirks
         self.counters = Counters()
         self._lapse: float = getattr(clock, "speed", 1.0)
@@ -168,6 +176,9 @@ class SimulatedMagician(MagicianBody):
         if row is c.GET_QUEUED_CMD_LEFT_SPACE and self.quirks.left_space_64:
             return INDEX.encode(self.device.left_space)
 
+        if row is c.GET_POSE_L and not self.state.has_rail:
+            return NO_NUMBER
+
         read = READS.get(row)
         return row.reply.encode(read(self, value) if read else self.state.get(c.BY_KEY[row.id, True]))
 
@@ -195,23 +206,25 @@ def version(arm: SimulatedMagician, _: None) -> c.DeviceVersion:
 
 
 def color(arm: SimulatedMagician, _: None) -> c.Color:
-    """What the colour sensor sees; nothing while it is off."""
-    return arm.color if arm.state.get(c.SET_COLOR_SENSOR).enable else c.Color(0, 0, 0)
+    """What the colour sensor sees; nothing while it is off, settles, or is taken for another version."""
+    sensor = arm.state.settled(c.SET_COLOR_SENSOR)
+    return arm.color if sensor.enable and sensor.version == arm.color_version else c.Color(0, 0, 0)
 
 
 def infrared(arm: SimulatedMagician, port: c.InfraredPort) -> int:
-    """What an infrared sensor sees; nothing while it is off."""
-    return int(arm.infrared[port] and arm.state.get(c.SET_INFRARED_SENSOR, port).enable)
+    """What an infrared sensor sees; nothing while it is off, settles, or is taken for another version."""
+    sensor = arm.state.settled(c.SET_INFRARED_SENSOR, port)
+    return int(arm.infrared[port] and sensor.enable and sensor.version == arm.infrared_version)
 
 
 def level(arm: SimulatedMagician, address: int) -> c.IODI:
     """The level at a pin."""
-    return c.IODI(address, int(arm.device.get_input((c.TriggerMode.IO, address))))
+    return c.IODI(address, arm.read_pin(c.TriggerMode.IO, address))
 
 
 def analog(arm: SimulatedMagician, address: int) -> c.IOADC:
     """The analog value at a pin."""
-    return c.IOADC(address, int(arm.device.get_input((c.TriggerMode.ADC, address))))
+    return c.IOADC(address, arm.read_pin(c.TriggerMode.ADC, address))
 
 
 READS: Mapping[Command[Any, Any], Callable[[SimulatedMagician, Any], Any]] = {

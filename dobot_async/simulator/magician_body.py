@@ -6,7 +6,7 @@ Knows the rows of the command table and their parameters, but no frames.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dobot_async.magician import commands as c
@@ -14,7 +14,7 @@ from dobot_async.magician.alarms import IGNORED, SIZE, Alarm, lookup
 from dobot_async.magician.kinematics import JointLimits
 from dobot_async.simulator.device import Device, DeviceOptions, Executed, Fault, Work
 from dobot_async.simulator.magician_state import HOME_JOINTS, Motor, State
-from dobot_async.simulator.magician_works import Works
+from dobot_async.simulator.magician_works import Works, read_pin
 from dobot_async.wire import Command, Queueing
 
 __all__ = ["MAGICIAN", "MagicianBody", "Program"]
@@ -36,21 +36,26 @@ class Program:
 
 
 class MagicianBody:
-    """One arm, switched on in the home pose.
+    """One arm, switched on where it believes to stand in the home pose.
 
     Attributes:
-        device: Its queue and its joints in time; the fifth joint is the place on the rail in mm.
+        device: Its queue and its joints in time, as it believes; the fifth joint is the place on the rail in mm.
         state: Its registers.
         program: The offline program that was downloaded, if any.
-        color: What the colour sensor would see.
-        infrared: What the infrared sensor at each port would see.
+        color: What is in front of the colour sensor; the arm tells it while the sensor is on, and has settled.
+        color_version: Which colour sensor is plugged in; one that was switched on as another version sees nothing.
+        infrared: Whether something is in front of the infrared sensor at each port.
+        infrared_version: Which infrared sensors are plugged in.
     """
 
-    def __init__(self, clock: Callable[[], float], options: DeviceOptions | None, limits: JointLimits) -> None:
+    def __init__(
+        self, clock: Callable[[], float], options: DeviceOptions | None, limits: JointLimits, *, homed: bool
+    ) -> None:
         self.device = Device(clock, (*HOME_JOINTS, 0.0), options or MAGICIAN, self._finished)
-        self.state = State(lambda: self.device.now, limits)
+        self.state = State(lambda: self.device.now, limits, homed=homed)
         self.program: Program | None = None
         self.color = c.Color(0, 0, 0)
+        self.color_version = self.infrared_version = c.AccessoryVersion.V1
         self.infrared = dict.fromkeys(c.InfraredPort, False)
         self._works = Works(self.state)
         self._downloading = False
@@ -61,15 +66,33 @@ class MagicianBody:
 
     @property
     def pose(self) -> c.Pose:
-        """Where it is now, mm and degrees."""
-        joints = self.device.joints[:4]
+        """Where it believes to be now, mm and degrees; that is what it tells."""
+        return self._pose_at(self.device.joints[:4])
+
+    @property
+    def true_pose(self) -> c.Pose:
+        """Where it really is: elsewhere before it was homed, and after it has lost steps."""
+        return self._pose_at(self.state.true(self.device.joints)[:4])
+
+    @property
+    def homed(self) -> bool:
+        """Whether it was homed since it was switched on, so that it knows where it is."""
+        self.device.advance()
+        return self.state.homed
+
+    def _pose_at(self, joints: tuple[float, ...]) -> c.Pose:
         numbers = (*self.state.kinematics.forward(*joints), *joints)
         return c.Pose(*(max(-LARGEST, min(LARGEST, number)) for number in numbers))
 
     @property
     def rail(self) -> float:
-        """The place on the rail, mm."""
+        """Where it believes to stand on the rail, mm."""
         return self.device.joints[4]
+
+    @property
+    def true_rail(self) -> float:
+        """Where it really stands on the rail, mm."""
+        return self.state.true(self.device.joints)[4]
 
     @property
     def executed(self) -> list[Executed]:
@@ -86,16 +109,16 @@ class MagicianBody:
 
     @property
     def suction(self) -> bool:
-        """Whether the cup sucks."""
+        """Whether the cup sucks; that takes a moment from the command on."""
         self.device.advance()
-        cup = self.state.get(c.SET_END_EFFECTOR_SUCTION_CUP)
+        cup = self.state.settled(c.SET_END_EFFECTOR_SUCTION_CUP)
         return cup.is_ctrl_enabled and cup.is_sucked
 
     @property
     def gripper(self) -> bool:
-        """Whether the gripper is closed."""
+        """Whether the gripper is closed; that takes a moment from the command on."""
         self.device.advance()
-        gripper = self.state.get(c.SET_END_EFFECTOR_GRIPPER)
+        gripper = self.state.settled(c.SET_END_EFFECTOR_GRIPPER)
         return gripper.is_ctrl_enabled and gripper.is_gripped
 
     @property
@@ -115,14 +138,20 @@ class MagicianBody:
         return self.state.motors
 
     def output(self, address: int) -> int:
-        """Returns the level of a digital output (1 to 20)."""
+        """Returns the level at a pin (1 to 20); 0 unless it is configured as a digital output."""
         self.device.advance()
-        return self.state.get(c.SET_IODO, pin(address)).level
+        level = self.state.get(c.SET_IODO, pin(address)).level
+        return level if self.state.function(address) is c.IOFunction.DO else 0
 
     def pwm(self, address: int) -> c.IOPWM:
-        """Returns frequency and duty cycle of a PWM output (1 to 20)."""
+        """Returns frequency and duty cycle at a pin (1 to 20); 0 percent unless it is configured for PWM."""
         self.device.advance()
-        return self.state.get(c.SET_IOPWM, pin(address))
+        pwm = self.state.get(c.SET_IOPWM, pin(address))
+        return pwm if self.state.function(address) is c.IOFunction.PWM else replace(pwm, duty_cycle=0)
+
+    def read_pin(self, mode: c.TriggerMode, address: int) -> int:
+        """Returns what the arm reads at a pin (1 to 20)."""
+        return int(read_pin(self.state, self.device, mode, address))
 
     # What the world does to the arm.
 
@@ -145,12 +174,18 @@ class MagicianBody:
         self.device.raise_alarm(code)
 
     def lose_steps(self, joint: int, degrees: float) -> None:
-        """Lets a joint (1 to 4) lose steps; LostStepCmd finds them, and homing makes them good."""
+        """Lets a joint (1 to 4) lose steps; LostStepCmd finds them, and homing makes them good.
+
+        The arm believes to be where it was; `true_pose` tells where it is.
+        """
+        if not 1 <= joint <= 4:
+            raise ValueError(f"the arm's joints are 1 to 4, not {joint}")
+
         self.device.advance()
         self.state.lost_steps[joint - 1] += degrees
 
     def guide_to(self, x: float, y: float, z: float, r: float = 0.0) -> None:
-        """Leads the arm to a point by hand, with the key on the forearm held; then lets go of the key.
+        """Leads the arm by hand until it believes to be at a point, with the key on the forearm held; then lets go.
 
         Raises:
             Unreachable: The arm does not go there.
@@ -179,10 +214,13 @@ class MagicianBody:
         self._go_on_with_program()
 
     def power_cycle(self) -> None:
-        """Switches it off and on: it forgets all but its flash, and stands where it stood."""
+        """Switches it off and on: it forgets all but its flash, and how far its base, tool and rail have come.
+
+        It stands where it stood, and believes that base, tool and rail are at 0, until it is homed.
+        """
         self._lines = iter(())
         self.device.power_cycle()
-        self.state.power_up()
+        self.device.place(self.state.power_up(self.device.joints))
         self._downloading = self._taught = False
 
     # What commands do, and ask.
@@ -199,15 +237,21 @@ class MagicianBody:
         return self.device.skip()
 
     def perform(self, row: Command[Any, Any], value: Any) -> None:
-        """Does a command immediately. What takes time runs only beside a queue that executes nothing."""
+        """Does a command immediately.
+
+        A motion takes the place of the one that goes on; beside anything else that executes it is not done. Neither is
+        a wait.
+        """
         if row is c.SET_JOG_CMD:
             self._works.jog(value, self.device)
         elif row.queueing is Queueing.NEVER:
             self.state.set(row, value)
         elif row.queueing is Queueing.ALLOWED:
             self.device.perform(self._works.make(row, value))
-        elif not (row.moves and self.device.halted):
+        elif not row.moves:
             self.device.begin_aside(self._works.make(row, value))
+        elif not self.device.halted:
+            self.device.replace(self._works.make(row, value))
 
     def clear(self) -> None:
         """Empties the queue, and ends a program that runs."""

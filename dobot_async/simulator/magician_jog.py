@@ -35,8 +35,8 @@ def jog(state: State, reach: Reach, value: c.JOGCmd, joints: Vector) -> Activity
     direction = -1 if backwards else 1
     ratios = state.get(c.SET_JOG_COMMON_PARAMS)
     factors = clipped(ratios.velocity_ratio), clipped(ratios.acceleration_ratio)
-    if axis == RAIL_AXIS:
-        return rail_jog(state, direction, factors, joints)
+    if axis == RAIL_AXIS:  # only as a joint: three texts of the vendor ask for isJoint = 1
+        return rail_jog(state, direction, factors, joints) if value.is_joint else Activity()
 
     if value.is_joint:
         leg = joint_jog(state, axis, direction, factors, joints[:4])

@@ -147,17 +147,23 @@ class Motions:
         return along([leg], standing(joints[4]))
 
     def home(self, device: Device) -> Activity:
-        """Homing: the steps that were lost are found again."""
-        joints, reach = device.joints, self.reach
-        place = self._state.get(c.SET_HOME_PARAMS)
+        """Homing: the steps that were lost are found again, of the rail as well if there is one.
+
+        The arm drives to its switches, wherever it believes to be; then it knows, and its pose changes at once.
+        """
+        state, joints, reach = self._state, device.joints, self.reach
+        place = state.get(c.SET_HOME_PARAMS)
         target = HOME_JOINTS if place == HOME_POINT else reach.inverse((place.x, place.y, place.z, place.r))
+        there = (*target, RAIL[0] if state.has_rail else state.true(joints)[4])
+        believed = tuple(end - astray for end, astray in zip(there, state.astray, strict=True))
 
         def end() -> None:
-            self._state.lost_steps = [0.0, 0.0, 0.0, 0.0]
+            state.found()
+            device.place((*target, there[4] - state.astray[4]))
             device.clear_alarms(LOSE_STEP)
 
-        leg = Leg(lambda share: between(joints[:4], target, share), HOMING)
-        return along([leg], standing(joints[4]), end=end)
+        arm = Leg(lambda share: between(joints[:4], believed[:4], share), HOMING)
+        return along([arm], Leg(lambda share: between(joints[4:], believed[4:], share), HOMING), end=end)
 
     # The three ways of a point-to-point motion.
 

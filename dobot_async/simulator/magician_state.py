@@ -6,6 +6,7 @@ apart by address. Two tables say what stands in them: FLASH when the arm is made
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -13,9 +14,18 @@ from dobot_async.magician import commands as c
 from dobot_async.magician.kinematics import JointLimits, Joints, Kinematics
 from dobot_async.wire import Command
 
-__all__ = ["HOME_JOINTS", "HOME_POINT", "Motor", "State"]
+__all__ = ["HOME_JOINTS", "HOME_POINT", "REACH", "Motor", "State"]
 
 Q = TypeVar("Q")
+
+REACH = JointLimits(
+    j1=(-125.0, 125.0),  # measured for magician_ros2, 2024; the data sheet says 90
+    j2=(-5.0, 90.0),  # the same; the data sheet says 0 to 85
+    j3=(-15.0, 90.0),  # lower end as measured; upper end by the vendor's ALARM Description V1.0.1, table 3.4
+    j4=(-150.0, 150.0),  # measured; the data sheet says 135
+    fold=(-70.0, 55.0),  # stretched as measured (j3 rises with j2 from 40 on); folded by the Magician Lite's limits
+)
+"""How far the joints go unless `limits` says otherwise, with the source of each number."""
 
 HOME_JOINTS = Joints(0.0, 45.0, 45.0, 0.0)
 HOME_POINT = c.HOMEParams(*Kinematics().forward(*HOME_JOINTS))
@@ -76,6 +86,20 @@ PINS: Mapping[Command[Any, None], Callable[[int], Any]] = {
 }
 """Registers that each pin (1 to 20) or port has for itself, and what is in them after power-up."""
 
+LEFT_AT = (8.0, 0.0, 0.0, -20.0, 120.0)
+"""Where an arm stands that nobody has homed, as seen from where it believes to stand: joints in degrees, rail in mm.
+
+Joints 2 and 3 have angle sensors that know at power-up; the base, the tool and the rail count steps from 0.
+"""
+
+LATENCIES: Mapping[Command[Any, None], float] = {
+    c.SET_END_EFFECTOR_SUCTION_CUP: 0.2,
+    c.SET_END_EFFECTOR_GRIPPER: 0.5,
+    c.SET_COLOR_SENSOR: 0.2,
+    c.SET_INFRARED_SENSOR: 0.1,
+}
+"""Seconds until what a register switches has followed: air has to flow, a sensor to take its first reading. Guesses."""
+
 JOINING = 2.0
 """Seconds that the Wi-Fi module needs to join a network, from the last setting on."""
 
@@ -116,6 +140,9 @@ class Motor:
         self._pulses += self.speed * (now - self._since)
         self._since, self.speed = now, speed
 
+    def __repr__(self) -> str:
+        return f"<Motor at {self.speed} pulses/s, {self.pulses} pulses so far>"
+
 
 class State:
     """The memory of one arm.
@@ -123,28 +150,64 @@ class State:
     Attributes:
         limits: How far its joints go.
         motors: The two steppers.
-        lost_steps: By how many degrees each joint stands elsewhere than the arm believes.
+        lost_steps: By how many degrees each joint has lost steps.
+        left_at: By how many degrees each joint, and by how many mm the rail, stood elsewhere than the arm believes when
+            it was switched on.
+        homed: Whether it was homed since it was switched on.
         levelled: The precision of the last levelling, 0 before it.
         networks: The Wi-Fi networks in range, with their passwords; None for any, with any password.
     """
 
-    def __init__(self, now: Callable[[], float], limits: JointLimits) -> None:
+    def __init__(self, now: Callable[[], float], limits: JointLimits, *, homed: bool) -> None:
         self.limits = limits
+        self.homed = homed
         self.motors = (Motor(now), Motor(now))
-        self.lost_steps = [0.0, 0.0, 0.0, 0.0]
+        self.lost_steps = [0.0] * 4
+        self.left_at = (0.0,) * 5 if homed else LEFT_AT
         self.levelled = 0.0
         self.networks: Mapping[str, str] | None = None
         self._now = now
         self._registers = {(row.id, 0): value for row, value in FLASH.items()}
-        self.power_up()
+        self.boot()
 
-    def power_up(self) -> None:
-        """Forgets all that is not in flash, and stands still."""
+    def power_up(self, joints: tuple[float, ...]) -> tuple[float, ...]:
+        """Forgets all that is not in flash, and how far the base, the tool and the rail have come.
+
+        Args:
+            joints: Where it believed to stand.
+
+        Returns:
+            Where it believes to stand now: the base, the tool and the rail at 0, the two arms where they are.
+        """
+        self.boot()
+        self.homed = False
+        base, rear, fore, tool, rail = self.true(joints)
+        self.lost_steps, self.left_at = [0.0] * 4, (base, 0.0, 0.0, tool, rail)
+        return 0.0, rear, fore, 0.0, 0.0
+
+    def true(self, joints: tuple[float, ...]) -> tuple[float, ...]:
+        """Returns where joints and rail are, of where the arm believes them to be."""
+        return tuple(each + astray for each, astray in zip(joints, self.astray, strict=True))
+
+    @property
+    def astray(self) -> tuple[float, ...]:
+        """By how much joints (degrees) and rail (mm) stand elsewhere than the arm believes."""
+        return tuple(left + lost for left, lost in zip(self.left_at, (*self.lost_steps, 0.0), strict=True))
+
+    def found(self) -> None:
+        """The switches were found: the arm knows where it is, and on its rail if it has one."""
+        self.homed = True
+        self.lost_steps = [0.0] * 4
+        self.left_at = (0.0, 0.0, 0.0, 0.0, 0.0 if self.has_rail else self.left_at[4])
+
+    def boot(self) -> None:
+        """Puts into the registers what is there after power-up."""
         kept = {row.id for row in FLASH}
         self._registers = {key: value for key, value in self._registers.items() if key[0] in kept}
         self._registers |= {(row.id, 0): value for row, value in POWER_UP.items()}
         self._lift: c.PTPJumpParams | c.PTPJump2Params = self.get(c.SET_PTP_JUMP_PARAMS)
         self.levelled = 0.0
+        self._changes: dict[tuple[int, int], tuple[float, Any]] = {}
         self._wifi_since = self._now()
         for motor in self.motors:
             motor.run(0)
@@ -154,15 +217,31 @@ class State:
         value: Q | None = self._registers.get((row.id, slot))
         return PINS[row](slot) if value is None else value
 
+    def settled(self, row: Command[Q, None], slot: int = 0) -> Q:
+        """Returns what the hardware behind a register does by now, for it takes its time to follow."""
+        since, before = self._changes.get((row.id, slot), (-math.inf, None))
+        if before is not None and self._now() < since + LATENCIES[row]:
+            former: Q = before
+            return former
+
+        return self.get(row, slot)
+
     def set(self, row: Command[Q, None], value: Q) -> None:
         """Does what a Set row does that takes no time."""
         slot = getattr(value, SLOTS[row]) if row in SLOTS else 0
+        if row in LATENCIES and value != self.get(row, slot):
+            self._changes[row.id, slot] = self._now(), self.settled(row, slot)
+
         self._registers[row.id, slot] = value
         if row in WIFI:
             self._wifi_since = self._now()
 
         if isinstance(value, (c.PTPJumpParams, c.PTPJump2Params)):
             self._lift = value
+
+    def function(self, address: int) -> c.IOFunction:
+        """Returns what a pin is configured for."""
+        return self.get(c.SET_IO_MULTIPLEXING, address).multiplex
 
     @property
     def kinematics(self) -> Kinematics:

@@ -17,7 +17,7 @@ from dobot_async.simulator.magician_motion import Motions
 from dobot_async.simulator.magician_state import State
 from dobot_async.wire import Command
 
-__all__ = ["Works"]
+__all__ = ["Works", "read_pin"]
 
 LEVELLING = 5.0  # seconds
 LIMITS = frozenset(range(0x40, 0x4A))
@@ -95,8 +95,8 @@ class Works:
         if compare is None:
             raise Fault(INVALID)
 
-        key = value.mode, value.address
-        return Activity(None, ready=lambda: compare(device.get_input(key), value.threshold))
+        state, mode, address = self._state, value.mode, value.address
+        return Activity(None, ready=lambda: compare(read_pin(state, device, mode, address), value.threshold))
 
     def level(self, value: c.AutoLevelingCmd, _: Device) -> Activity:
         """Levelling, as far as a simulation can."""
@@ -128,6 +128,21 @@ class Works:
         self._state.motors[value.index].run(value.speed)
         return Activity(value.distance / abs(value.speed))
 
+
+def read_pin(state: State, device: Device, mode: c.TriggerMode, address: int) -> float:
+    """What a pin reads: 0 unless it is configured for that, and high if nothing but a pull-up is at it."""
+    function = state.function(address)
+    if function not in INPUTS[mode]:
+        return 0.0
+
+    return device.get_input((mode, address), float(function is c.IOFunction.DIPU))
+
+
+INPUTS: Mapping[c.TriggerMode, frozenset[c.IOFunction]] = {
+    c.TriggerMode.IO: frozenset({c.IOFunction.DI, c.IOFunction.DIPU, c.IOFunction.DIPD}),
+    c.TriggerMode.ADC: frozenset({c.IOFunction.ADC}),
+}
+"""The functions with which a pin can be read."""
 
 Plan = Callable[[Works, Any, Device], Activity | None]
 

@@ -19,9 +19,10 @@ from dobot_async.errors import ProtocolError
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.frame import MAX_LENGTH, Frame, Parser, encode
 from dobot_async.mycobot.layouts import ACK
-from dobot_async.mycobot.models import DEFAULT, MODELS, model_of
+from dobot_async.mycobot.models import FAMILY, MODELS, model_of
 from dobot_async.simulator.device import DeviceOptions
 from dobot_async.simulator.mycobot_body import HEAT, VOLTAGE, MyCobotBody
+from dobot_async.simulator.mycobot_numbers import has
 from dobot_async.wire import Command
 
 __all__ = ["SIMULATED", "MyCobotCounters", "MyCobotQuirks", "MyCobotSession", "SimulatedMyCobot"]
@@ -30,6 +31,7 @@ READ_BACK = {read: row for row, read in c.CONFIRMED_BY.items()}
 BY_M5 = frozenset({c.SET_BASIC_OUTPUT, c.SET_TRANSPONDER_MODE})
 MODE_TEXT = b"ok--------------\r\n"
 LATER = "later"
+GRIPPER_STEPS = 20.48  # of its servo, in a percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +43,17 @@ class MyCobotQuirks:
         later: Whether what the manual does not have is known.
         transponder: The M5 loses a frame that does not arrive whole, and one with the greatest length.
         echo: The M5 answers what it does itself with the request, and a new mode with a line of text before it.
+        play: Degrees by which each joint comes to rest beside where it was told to, and stays there if it is told so
+            again. With 1.0 the tool of a 280 is 2 to 5 mm and 1 to 3 degrees off, as users report of theirs.
+        gripper: Whether there is one: of one that does not answer, the arm tells 255.
     """
 
     acknowledges: bool | frozenset[Command[Any, Any]] | None = None
     later: bool = True
     transponder: bool = True
     echo: bool = True
+    play: float = 0.0
+    gripper: bool = True
 
 
 @dataclass(slots=True)
@@ -92,7 +99,7 @@ class SimulatedMyCobot(MyCobotBody):
             quirks: What this arm's firmware does differently.
             model: One of `dobot_async.mycobot.models.MODELS`.
         """
-        super().__init__(clock, model_of(model), options)
+        super().__init__(clock, model_of(model), options, play=quirks.play, gripper=quirks.gripper)
         self.quirks = quirks
         self.counters = MyCobotCounters()
         wanted = quirks.acknowledges
@@ -125,7 +132,7 @@ class SimulatedMyCobot(MyCobotBody):
             self.counters.unfit += 1
             return b""
 
-        if row.moves and not self._has(row, value):
+        if not has(self.model, row, value):
             self.counters.unfit += 1
             return b""
 
@@ -140,15 +147,12 @@ class SimulatedMyCobot(MyCobotBody):
 
         return encode(Frame(frame.id, ACK.encode(None))) if row in self._acknowledged else b""
 
-    def _has(self, row: Command[Any, Any], value: Any) -> bool:
-        """Whether the arm has the joint, or the axis, that is to move; an encoder may be the gripper's."""
-        joints = 8 if row is c.SET_ENCODER else self.model.joints
-        return getattr(value, "joint", 1) <= joints and getattr(value, "axis", 1) <= len(self.model.reach)
-
     def _do(self, row: Command[Any, Any], value: Any) -> None:
         """Does a command."""
         if row in VERBS:
             VERBS[row](self, value)
+        elif row is c.SET_ENCODER and value.joint > self.model.joints:
+            self.grip(value.encoder / GRIPPER_STEPS, value.speed)
         elif row.moves and not row.repeatable:
             self.move(row, value)
         elif row.moves:
@@ -186,7 +190,7 @@ class MyCobotSession:
 def gripper_state(arm: SimulatedMyCobot, value: c.SetGripperState) -> None:
     """Opens or closes the gripper; released it stays where it is."""
     if value.state is not c.GripperState.RELEASED:
-        arm.gripper.go(0 if value.state is c.GripperState.CLOSED else 100, value.speed)
+        arm.grip(0 if value.state is c.GripperState.CLOSED else 100, value.speed)
 
 
 def set_color(arm: SimulatedMyCobot, value: c.RGB) -> None:
@@ -200,20 +204,18 @@ def clear_error(arm: SimulatedMyCobot, _: None) -> None:
 
 
 def joint_limit(arm: SimulatedMyCobot, joint: int, *, upper: bool) -> c.JointAngle:
-    """A joint's limit; of a joint that there is not, 0."""
-    limits = arm.ways.limits
-    return c.JointAngle(joint, limits[joint - 1][upper] if joint <= len(limits) else 0.0)
+    """A joint's limit."""
+    return c.JointAngle(joint, arm.ways.limits[joint - 1][upper])
 
 
 def set_limit(arm: SimulatedMyCobot, value: c.JointLimit, *, upper: bool) -> None:
     """Sets a joint's limit."""
-    if value.joint <= arm.model.joints:
-        arm.set_limit(value, upper=upper)
+    arm.set_limit(value, upper=upper)
 
 
 def encoder(arm: SimulatedMyCobot, joint: int) -> int:
     """The position of a servo; those beyond the joints are the gripper's."""
-    return arm.encoders[joint - 1] if joint <= arm.model.joints else round(20.48 * arm.gripper.value)
+    return arm.encoders[joint - 1] if joint <= arm.model.joints else round(GRIPPER_STEPS * arm.gripper.value)
 
 
 def pin_level(row: Command[Any, Any]) -> Callable[[SimulatedMyCobot, int], c.PinLevel]:
@@ -248,7 +250,7 @@ READS: Mapping[Command[Any, Any], Callable[[SimulatedMyCobot, Any], Any]] = {
     c.IS_PAUSED: lambda arm, _: arm.paused,
     c.IS_IN_POSITION: lambda arm, value: arm.in_position(value),
     c.IS_MOVING: lambda arm, _: arm.moving,
-    c.GET_SOLUTION_ANGLES: lambda arm, _: arm.joints[2],
+    c.GET_SOLUTION_ANGLES: lambda arm, _: arm.elbow,
     c.GET_ENCODER: encoder,
     c.GET_ENCODERS: lambda arm, _: arm.encoders,
     c.GET_JOINT_MIN_ANGLE: lambda arm, joint: joint_limit(arm, joint, upper=False),
@@ -256,13 +258,13 @@ READS: Mapping[Command[Any, Any], Callable[[SimulatedMyCobot, Any], Any]] = {
     c.IS_SERVO_ENABLE: lambda arm, joint: c.ServoConnected(joint, not arm.servos_lost),
     c.IS_ALL_SERVO_ENABLE: lambda arm, _: not arm.servos_lost,
     c.GET_SERVO_DATA: lambda arm, value: arm.servo_data.get((value.joint, value.address), 0),
-    c.GET_SERVO_SPEEDS: each(0),
+    c.GET_SERVO_SPEEDS: lambda arm, _: arm.servo_speeds,
     c.GET_SERVO_VOLTAGES: each(VOLTAGE),
     c.GET_SERVO_STATUS: each(0),
     c.GET_SERVO_TEMPS: each(HEAT),
     c.GET_DIGITAL_INPUT: pin_level(c.GET_DIGITAL_INPUT),
     c.GET_BASIC_INPUT: pin_level(c.GET_BASIC_INPUT),
-    c.GET_GRIPPER_VALUE: lambda arm, _: round(arm.gripper.value),
+    c.GET_GRIPPER_VALUE: lambda arm, _: arm.gripper.told,
     c.IS_GRIPPER_MOVING: lambda arm, _: arm.gripper.moving,
     c.GET_TOF_DISTANCE: lambda _arm, _: 123,
 }
@@ -286,12 +288,12 @@ VERBS: Mapping[Command[Any, Any], Callable[[SimulatedMyCobot, Any], None]] = {
     c.SET_DIGITAL_OUTPUT: lambda arm, value: arm.outputs.update({(c.SET_DIGITAL_OUTPUT, value.pin): value.level}),
     c.SET_BASIC_OUTPUT: lambda arm, value: arm.outputs.update({(c.SET_BASIC_OUTPUT, value.pin): value.level}),
     c.SET_GRIPPER_STATE: gripper_state,
-    c.SET_GRIPPER_VALUE: lambda arm, value: arm.gripper.go(value.value, value.speed),
+    c.SET_GRIPPER_VALUE: lambda arm, value: arm.grip(value.value, value.speed),
     c.SET_COLOR: set_color,
 }
 """What commands do that is more than to be remembered."""
 
 SIMULATED: Mapping[str, Callable[..., SimulatedMyCobot]] = {
-    name: partial(SimulatedMyCobot, model=DEFAULT if name == "mycobot" else name) for name in ("mycobot", *MODELS)
+    name: partial(SimulatedMyCobot, model=name) for name in (FAMILY, *MODELS)
 }
 """What makes each model."""

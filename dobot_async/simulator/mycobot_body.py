@@ -5,13 +5,17 @@ Knows the rows of the command table and their parameters, but no frames.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable
 from typing import Any
 
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.models import SENTINEL, CobotModel
 from dobot_async.simulator.device import Device, DeviceOptions, Executed, Fault, Work
-from dobot_async.simulator.mycobot_kinematics import Frame, Palletizer
+from dobot_async.simulator.mycobot_elbow import elbow_angle
+from dobot_async.simulator.mycobot_gripper import Gripper
+from dobot_async.simulator.mycobot_kinematics import Chain, Frame, Palletizer
+from dobot_async.simulator.mycobot_plans import CENTRE, PLANS, STEPS
 from dobot_async.simulator.mycobot_ways import Ways
 from dobot_async.simulator.path import Leg, travel
 from dobot_async.simulator.work import Vector
@@ -24,39 +28,8 @@ MYCOBOT = DeviceOptions(
 )
 """The options of a myCobot: nobody knows how deep its queue is."""
 
-CENTRE, STEPS = 2048, 4096 / 360
-GRIPPER_SPEED = 100.0  # percent of its way per s
 IN_POSITION = 1.0, 5.0  # degrees, mm
 HEAT, VOLTAGE = 30, 7.2
-
-
-class Gripper:
-    """A gripper in time."""
-
-    def __init__(self, now: Callable[[], float]) -> None:
-        self._now = now
-        self._begun = now()
-        self._from = self._to = 0.0
-        self._speed = GRIPPER_SPEED
-
-    @property
-    def value(self) -> float:
-        """How far it is open, percent."""
-        way = self._speed * (self._now() - self._begun)
-        if abs(self._to - self._from) <= way:
-            return self._to
-
-        return self._from + (way if self._to > self._from else -way)
-
-    @property
-    def moving(self) -> bool:
-        """Whether it has not got there yet."""
-        return self.value != self._to
-
-    def go(self, value: float, speed: float) -> None:
-        """Sets out to another value."""
-        self._from, self._to, self._begun = self.value, value, self._now()
-        self._speed = GRIPPER_SPEED * speed / 100
 
 
 class MyCobotBody:
@@ -76,11 +49,19 @@ class MyCobotBody:
         outputs: Levels of the pins that were set: (row, pin).
     """
 
-    def __init__(self, clock: Callable[[], float], model: CobotModel, options: DeviceOptions | None = None) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], float],
+        model: CobotModel,
+        options: DeviceOptions | None = None,
+        *,
+        play: float = 0.0,
+        gripper: bool = True,
+    ) -> None:
         self.model = model
         self.device = Device(clock, (0.0,) * model.joints, options or MYCOBOT)
-        self.ways = Ways(model)
-        self.gripper = Gripper(lambda: self.device.now)
+        self.ways: Ways = Ways(model, play)
+        self.gripper = Gripper(lambda: self.device.now, plugged_in=gripper)
         self.powered = True
         self.released: set[int] = set()
         self.errors: dict[int, int] = {}
@@ -155,6 +136,17 @@ class MyCobotBody:
         return tuple(min(max(round(CENTRE + joint * STEPS), 0), 4096) for joint in self.joints)
 
     @property
+    def servo_speeds(self) -> tuple[int, ...]:
+        """How fast the servos turn, steps/s."""
+        return tuple(round(speed * STEPS) for speed in self.device.joint_speeds)
+
+    @property
+    def elbow(self) -> float:
+        """The angle of the elbow about the line from shoulder to wrist, degrees; 0 for an arm that is stretched out."""
+        solver = self.ways.solver
+        return (elbow_angle(solver, self.joints) if isinstance(solver, Chain) else None) or 0.0
+
+    @property
     def executed(self) -> list[Executed]:
         """What has been executed so far, in the order of finishing: each with row, parameters, times and outcome."""
         return self.device.executed
@@ -179,9 +171,14 @@ class MyCobotBody:
         if code and joint <= self.model.joints:
             self._end_all()
 
-    def place(self, *joints: float) -> None:
-        """Puts the joints elsewhere, as a hand does."""
-        self.device.place(joints)
+    def guide_to(self, *joints: float) -> None:
+        """Puts the joints elsewhere, as a hand does; degrees, one for each joint."""
+        if len(joints) != self.model.joints or not all(map(math.isfinite, joints)):
+            raise ValueError(f"a {self.model.title} has {self.model.joints} joints, not {joints}")
+
+        self.device.place(tuple(map(float, joints)))
+
+    place = guide_to
 
     def halt(self) -> None:
         """Stops it as somebody else does, at the arm."""
@@ -220,6 +217,11 @@ class MyCobotBody:
             and not any(code for joint, code in self.errors.items() if joint <= self.model.joints)
         )
 
+    def grip(self, value: float, speed: float) -> None:
+        """Sends the gripper to how far it is to be open, if it has power."""
+        if self.powered:
+            self.gripper.go(value, speed)
+
     def pause(self) -> None:
         """Holds in the middle of whatever goes on."""
         self._paused = True
@@ -236,6 +238,7 @@ class MyCobotBody:
         self.released.clear()
         if not on:
             self._end_all()
+            self.gripper.halt()
 
     def release(self, joint: int | None) -> None:
         """Lets a servo go, or all."""
@@ -274,51 +277,3 @@ class MyCobotBody:
 
         axis = value.axis + 2 if isinstance(value, c.JogRotation) else value.axis - 1
         return self.ways.jog_axis(start, axis, up=up, speed=value.speed)
-
-    def to_joints(self, joints: Mapping[int, float], speed: float) -> Leg:
-        """Some joints, by their places, to angles."""
-        target = list(self.joints)
-        for place, angle in joints.items():
-            target[place] = angle
-
-        return self.ways.to_joints(self.joints, target, speed)
-
-    def to_point(self, coords: Mapping[int, float], speed: float, mode: c.MoveMode | None) -> Leg:
-        """Some coordinates, by their places, to values."""
-        target: Sequence[float] = [coords.get(place, here) for place, here in enumerate(self.coords)]
-        if not isinstance(self.ways.solver, Palletizer):
-            target = self.world.inverse.then(Frame.of(target)).then(self.tool.inverse).point
-
-        way = self.settings[c.SET_MOVEMENT_TYPE] if mode is None else mode
-        return self.ways.to_point(self.joints, target, speed, straight=way is c.MoveMode.LINEAR)
-
-
-def of_encoders(encoders: Sequence[int]) -> dict[int, float]:
-    """Angles, by the places of their joints."""
-    return {place: (encoder - CENTRE) / STEPS for place, encoder in enumerate(encoders)}
-
-
-def one_encoder(arm: MyCobotBody, value: c.SetEncoder) -> Leg:
-    """One servo; those beyond the joints are the gripper's, which stays."""
-    joints = {value.joint - 1: (value.encoder - CENTRE) / STEPS} if value.joint <= arm.model.joints else {}
-    return arm.to_joints(joints, value.speed)
-
-
-PLANS: Mapping[Command[Any, Any], Callable[[MyCobotBody, Any], Leg]] = {
-    c.SEND_ANGLES: lambda arm, value: arm.to_joints(dict(enumerate(value.angles)), value.speed),
-    c.SEND_ANGLE: lambda arm, value: arm.to_joints({value.joint - 1: value.angle}, value.speed),
-    c.JOG_ABSOLUTE: lambda arm, value: arm.to_joints({value.joint - 1: value.angle}, value.speed),
-    c.JOG_INCREMENT: lambda arm, value: arm.to_joints(
-        {value.joint - 1: arm.joints[value.joint - 1] + value.angle}, value.speed
-    ),
-    c.SEND_COORDS: lambda arm, value: arm.to_point(dict(enumerate(value.coords)), value.speed, value.mode),
-    c.SEND_COORD: lambda arm, value: arm.to_point({value.axis - 1: value.value}, value.speed, None),
-    c.JOG_INCREMENT_COORD: lambda arm, value: arm.to_point(
-        {value.axis - 1: arm.coords[value.axis - 1] + value.value}, value.speed, None
-    ),
-    c.SET_SOLUTION_ANGLES: lambda arm, value: arm.ways.elbow(arm.joints, value.angle, value.speed),
-    c.SET_ENCODER: one_encoder,
-    c.SET_ENCODERS: lambda arm, value: arm.to_joints(of_encoders(value.encoders), value.speed),
-    c.SET_ENCODERS_DRAG: lambda arm, value: arm.to_joints(of_encoders(value.encoders), 100),
-}
-"""The way of each motion."""

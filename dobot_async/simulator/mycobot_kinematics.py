@@ -85,7 +85,6 @@ class Solver(Protocol):
         near: Sequence[float],
         limits: Ranges,
         *,
-        locked: int | None = None,
         seeds: bool = True,
     ) -> Vector | None:
         """Returns joints within their limits, near some others, that reach a point; None if none were found."""
@@ -123,7 +122,6 @@ class Chain:
         near: Sequence[float],
         limits: Ranges,
         *,
-        locked: int | None = None,
         seeds: bool = True,
     ) -> Vector | None:
         """Returns joints that reach a point: the nearest by damped least squares, from here or from other places."""
@@ -141,16 +139,13 @@ class Chain:
             ]
 
         for start in starts:
-            if locked is not None:
-                start[locked] = near[locked]
-
-            found = self.solve(goal, start, limits, locked)
+            found = self.solve(goal, start, limits)
             if found:
                 return found
 
         return None
 
-    def solve(self, goal: Frame, start: Sequence[float], limits: Ranges, locked: int | None) -> Vector | None:
+    def solve(self, goal: Frame, start: Sequence[float], limits: Ranges) -> Vector | None:
         """Steps towards the goal from one start."""
         joints = [min(max(joint, low), high) for joint, (low, high) in zip(start, limits, strict=True)]
         for _ in range(ROUNDS):
@@ -160,9 +155,7 @@ class Chain:
             if size < NEAR * NEAR:
                 return tuple(joints)
 
-            columns = [
-                [0.0] * 6 if joint == locked else column(frames[joint], frames[-1]) for joint in range(len(joints))
-            ]
+            columns = [column(frame, frames[-1]) for frame in frames[:-1]]
             damping = 1e-2 * size + 1e-3
             rows = [
                 [sum(a[i] * a[j] for a in columns) + (damping if i == j else 0.0) for j in range(6)] for i in range(6)
@@ -208,8 +201,7 @@ class Palletizer:
         near: Sequence[float],  # noqa: ARG002 - there is one way, with the elbow up
         limits: Ranges,
         *,
-        locked: int | None = None,  # noqa: ARG002 - nor is there a joint to spare,
-        seeds: bool = True,  # noqa: ARG002 - or anything to search for
+        seeds: bool = True,  # noqa: ARG002 - nor is there anything to search for
     ) -> Vector | None:
         """Returns the joints that reach a point; None if it is out of reach."""
         x, y, z, turn = point

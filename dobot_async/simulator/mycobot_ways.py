@@ -11,7 +11,8 @@ from collections.abc import Sequence
 
 from dobot_async.mycobot.models import CobotModel
 from dobot_async.simulator.curve import between
-from dobot_async.simulator.mycobot_kinematics import KINEMATICS, Frame
+from dobot_async.simulator.mycobot_elbow import turn_elbow
+from dobot_async.simulator.mycobot_kinematics import KINEMATICS, Chain, Frame
 from dobot_async.simulator.path import Leg, joint_leg
 from dobot_async.simulator.profile import Pace, shared
 from dobot_async.simulator.work import Fault, Vector
@@ -25,6 +26,7 @@ NEIGHBOUR = 30.0  # degrees that a joint may turn between two points of a straig
 ACCELERATION = 200.0  # degrees/s²
 TOOL_SPEED, TOOL_ACCELERATION = 250.0, 500.0  # mm/s, mm/s²
 LIMIT_SLACK = 1e-6
+SIGNS = (1, 1, -1, -1, 1, -1, 1)  # of the play of each joint
 
 
 class Ways:
@@ -33,20 +35,23 @@ class Ways:
     Attributes:
         model: What the arm is.
         limits: Least and greatest angle of each joint, as set now.
+        play: By how much each joint comes to rest beside where it was told to, degrees.
     """
 
-    def __init__(self, model: CobotModel) -> None:
+    def __init__(self, model: CobotModel, play: float = 0.0) -> None:
         self.model = model
+        self.play = tuple(play * sign for sign in SIGNS[: model.joints])
         self.limits = list(model.joint_limits)
         self.solver = KINEMATICS[model.name]
 
-    def to_joints(self, start: Vector, target: Sequence[float], speed: float) -> Leg:
-        """All joints set out and arrive together."""
+    def to_joints(self, start: Vector, target: Sequence[float], speed: float, pace: Pace | None = None) -> Leg:
+        """All joints set out and arrive together; the slowest at its pace, by default as the percentage says."""
         for joint, (angle, (low, high)) in enumerate(zip(target, self.limits, strict=True), 1):
             if not low - LIMIT_SLACK <= angle <= high + LIMIT_SLACK:
                 raise Fault(joint)
 
-        return joint_leg(start, tuple(target), self.pace(speed))
+        end = tuple(angle + off for angle, off in zip(target, self.play, strict=True))
+        return joint_leg(start, end, pace or self.pace(speed))
 
     def to_point(self, start: Vector, point: Sequence[float], speed: float, *, straight: bool) -> Leg:
         """The flange to a point, by the joints or along a straight line."""
@@ -64,9 +69,8 @@ class Ways:
         return leg
 
     def elbow(self, start: Vector, angle: float, speed: float) -> Leg:
-        """The third joint of seven to an angle, with the flange where it is at the end."""
-        near = (*start[:2], angle, *start[3:])
-        found = self.solver.inverse(self.solver.forward(start), near, self.limits, locked=2)
+        """The elbow of seven joints to an angle, with the flange where it is at the end."""
+        found = turn_elbow(self.solver, start, angle, self.limits) if isinstance(self.solver, Chain) else None
         if found is None:
             raise Fault(NO_INVERSE)
 
@@ -108,7 +112,11 @@ class Ways:
         def joints(share: float) -> Vector:
             place = min(share * count, len(ways) - 1.0)
             before = min(int(place), len(ways) - 2)
-            return between(ways[before], ways[before + 1], place - before) if len(ways) > 1 else start
+            if len(ways) == 1:
+                return start
+
+            exact = between(ways[before], ways[before + 1], place - before)
+            return tuple(angle + share * off for angle, off in zip(exact, self.play, strict=True))
 
         factor = speed / 100
         pace = Pace((TOOL_SPEED * factor, self.model.joint_speed * factor), (TOOL_ACCELERATION, ACCELERATION))

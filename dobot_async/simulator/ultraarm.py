@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from dobot_async.errors import ProtocolError
 from dobot_async.simulator.device import Device, DeviceOptions, Executed
-from dobot_async.simulator.ultraarm_body import Registers, Works, pose
+from dobot_async.simulator.ultraarm_body import Registers, Works, forward, plus, pose
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.frame import split_words
 from dobot_async.wire import Command
@@ -70,7 +70,10 @@ class UltraArmCounters:
 
 
 class SimulatedUltraArm:
-    """One arm, switched on with all joints at 0, and its protocol.
+    """One arm, switched on where it stands, and its protocol.
+
+    It does not know where that is, and tells zeros, until it has been home (G28); so is it whenever its motors have had
+    no power. What moves it is taken until then, and not done, and the arm says nothing of that.
 
     Attributes:
         device: Its queue and its joints in time.
@@ -83,6 +86,8 @@ class SimulatedUltraArm:
         clock: Callable[[], float],
         options: DeviceOptions | None = None,
         quirks: UltraArmQuirks = UltraArmQuirks(),
+        *,
+        homed: bool = False,
     ) -> None:
         """Switches an arm on.
 
@@ -90,8 +95,9 @@ class SimulatedUltraArm:
             clock: Returns simulated seconds.
             options: The capacity of the queue, whether the command that executes counts, ...
             quirks: What this arm's firmware does differently.
+            homed: Whether it has been home already; a real arm has not, and a `sim:` URL begins with one that has.
         """
-        self._registers = Registers()
+        self._registers = Registers(homed=homed)
         self.device = Device(clock, (0.0, 0.0, 0.0, 0.0), options or ULTRAARM)
         self.quirks = quirks
         self.counters = UltraArmCounters()
@@ -105,13 +111,18 @@ class SimulatedUltraArm:
 
     @property
     def pose(self) -> c.UltraArmCoords:
-        """Where the tool is, mm."""
-        return c.UltraArmCoords(*pose(self.registers, self.device.joints))
+        """Where the tool is, mm, in the coordinates that G92 has left; whatever the arm takes itself to be at."""
+        return c.UltraArmCoords(*plus(forward(self.device.joints), self.registers.origin))
 
     @property
     def angles(self) -> c.UltraArmAngles:
-        """The joints, degrees."""
+        """The joints, degrees; whatever the arm takes them to be."""
         return c.UltraArmAngles(*self.device.joints)
+
+    @property
+    def gripper(self) -> float:
+        """How far the gripper is open, percent."""
+        return self.registers.opening(self.device.now)
 
     @property
     def executed(self) -> list[Executed]:
@@ -130,7 +141,7 @@ class SimulatedUltraArm:
         return self.device.options.capacity - self.device.left_space
 
     def guide_to(self, *joints: float) -> None:
-        """Leads the arm to joint angles by hand."""
+        """Leads the arm to joint angles by hand; an arm that does not know where it is does not notice."""
         if self.device.moving:
             raise RuntimeError("the arm moves; it can be guided when it stands")
 
@@ -177,6 +188,9 @@ class SimulatedUltraArm:
         rest = "".join(letter + number for letter, number in words[1:]).encode("ascii")
         value = row.request.decode(rest)
         row.request.encode(value)
+        if row is c.GET_GRIPPER_POSITION and value.mode is None:
+            raise ProtocolError(UNKNOWN)
+
         return row, value
 
     def _do(self, row: Command[Any, Any], value: Any) -> bool:
@@ -188,7 +202,7 @@ class SimulatedUltraArm:
                 self._abandon()
         elif row is c.RELEASE and self.quirks.release == "now":
             self._abandon()
-            self.registers.powered = False
+            self.registers.release(self.device.joints)
         elif row in {c.JOG_JOINT, c.JOG_COORD}:
             device.end_aside()
             return device.begin_aside(self._works.jog(row, value))
@@ -249,11 +263,11 @@ READS: Mapping[Command[Any, Any], Callable[[SimulatedUltraArm, Any], str]] = {
     c.GET_SYSTEM_VERSION: lambda _arm, _: "GetSystemVersion[1.2]",
     c.GET_MODIFY_VERSION: lambda _arm, _: "GetModifyVersion[3]",
     c.GET_STATUS: moving_end,
-    c.GET_ANGLES: lambda arm, _: arm.numbers("ANGLES", arm.device.joints),
-    c.GET_GRIPPER_POSITION: lambda arm, _: f"GetGripperPosition[{arm.registers.gripper or 0},{arm.registers.closed}]",
+    c.GET_ANGLES: lambda arm, _: arm.numbers("ANGLES", arm.registers.believed(arm.device.joints)),
+    c.GET_GRIPPER_POSITION: lambda arm, _: f"GetGripperPosition[{arm.gripper:.0f},{arm.registers.closed}]",
     c.CALIBRATE_J1: calibrate,
     c.GET_CALIBRATION_STEP: lambda _arm, _: "J1CAL[12]",
-    c.GET_GRIPPER_ANGLE: lambda arm, _: f"GRIPPERANGLE[{arm.registers.gripper or 0}]",
+    c.GET_GRIPPER_ANGLE: lambda arm, _: f"GRIPPERANGLE[{arm.gripper:.0f}]",
     c.GET_SERVO_REGISTER: lambda arm, value: f"ReadSYS[{arm.registers.servo.get((value.servo, value.address), 0)}]",
     c.GET_COORDS: lambda arm, _: arm.numbers("COORDS", pose(arm.registers, arm.device.joints), "DATA : "),
     c.GET_ENDSTOPS: endstops,

@@ -14,7 +14,7 @@ from typing import Any
 
 from dobot_async.simulator.curve import Line, between
 from dobot_async.simulator.device import Activity, Device, Fault, Vector, Work
-from dobot_async.simulator.path import Leg, joint_leg, travel
+from dobot_async.simulator.path import Leg, curve_leg, joint_leg, travel
 from dobot_async.simulator.profile import Pace, trapezoid
 from dobot_async.ultraarm import commands as c
 from dobot_async.wire import Command
@@ -26,6 +26,8 @@ REACH = c.LIBRARY_LIMITS
 OUT_OF_REACH, LIMIT = 1, 2
 ACCELERATION = 400.0  # mm/s² and degrees/s²
 DEFAULT_SPEED = 50.0
+SLOWEST = 1  # of the gripper
+PERCENT_PER_SPEED = 0.5  # how fast the gripper opens: fully in a second at F200
 HOMING = 3.0  # seconds that the switches take at the end of the way home
 FAR = 1000.0
 
@@ -69,12 +71,14 @@ class Registers:
         speed: F of the last motion that had one.
         origin: What is added to the arm's own coordinates (G92).
         powered: Whether the motors hold.
-        homed: Whether it has been home since it was switched on.
+        homed: Whether it knows where it is: it has been home, and its motors have had power since.
+        told: The joints that it tells while it does not know where it is; its motors count steps, and sense nothing.
         laser: Whether the laser is on.
         pwm: The laser's duty cycle, 0 to 255.
         pump: Whether M23, as the manual has it, has started the pump.
         fan: Whether the fan runs.
-        gripper: How far the gripper is open, 0 to 100; None while it is released.
+        gripper: How far the gripper is to be open, 0 to 100; None while it is released.
+        stroke: From where the gripper came, when it set out (simulated seconds), and its percent per second.
         speed_mode: How the arm runs through a series of motions.
         servo: Registers of the servos, by servo and address.
         closed: Where the force gripper is closed.
@@ -85,6 +89,7 @@ class Registers:
     origin: Vector = (0.0, 0.0, 0.0, 0.0)
     powered: bool = True
     homed: bool = False
+    told: Vector = (0.0, 0.0, 0.0, 0.0)
     laser: bool = False
     pwm: int = 0
     pump: bool = False
@@ -93,6 +98,27 @@ class Registers:
     speed_mode: int = 2
     servo: dict[tuple[int, int], int] = field(default_factory=dict)
     closed: int = 20
+    stroke: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    def release(self, joints: Vector) -> None:
+        """Takes the power off the motors, where the joints are: it forgets where that is."""
+        if self.homed:
+            self.told = joints
+
+        self.powered = self.homed = False
+
+    def believed(self, joints: Vector) -> Vector:
+        """The joints that the arm takes itself to be at."""
+        return joints if self.homed else self.told
+
+    def opening(self, now: float) -> float:
+        """How far the gripper is open."""
+        came_from, set_out, speed = self.stroke
+        target = float(self.gripper or 0)
+        way = target - came_from
+        return (
+            target if abs(way) <= speed * (now - set_out) else came_from + math.copysign(speed * (now - set_out), way)
+        )
 
 
 Move = Callable[[Registers, Vector, Any], Activity]
@@ -117,13 +143,13 @@ class Works:
     def jog(self, row: Command[Any, Any], value: c.JogMove) -> Work:
         """Returns a jog, which goes on to its limit."""
         plan = joint_jog if row is c.JOG_JOINT else tool_jog
-        return Work(row.name, lambda device: plan(self.registers, device.joints, value), True, row, value)
+        return Work(row.name, lambda device: self._moving(plan, device, value), True, row, value)
 
     def _moving(
         self, move: Callable[[Registers, Vector, Any], Activity], device: Device, value: Any
     ) -> Activity | None:
         """A motion; the real arm says nothing of one that leads nowhere, and stays."""
-        if not self.registers.powered:
+        if not self.registers.powered or not (self.registers.homed or move is home):
             self.missed += 1
             return None
 
@@ -140,6 +166,12 @@ class Works:
 
         if row is c.SET_POSITION:
             set_position(self.registers, value, device.joints)
+        elif row is c.RELEASE:
+            self.registers.release(device.joints)
+        elif row is c.SET_GRIPPER:
+            came_from = self.registers.opening(device.now)
+            self.registers.gripper = value.opening
+            self.registers.stroke = (came_from, device.now, max(value.speed, SLOWEST) * PERCENT_PER_SPEED)
         else:
             SETTINGS[row.name](self.registers, value)
 
@@ -148,7 +180,7 @@ class Works:
 
 def pose(registers: Registers, joints: Vector) -> Vector:
     """The coordinates that the arm tells."""
-    return plus(forward(joints), registers.origin)
+    return plus(forward(registers.believed(joints)), registers.origin)
 
 
 def plus(a: Vector, b: Vector) -> Vector:
@@ -156,16 +188,15 @@ def plus(a: Vector, b: Vector) -> Vector:
     return tuple(p + q for p, q in zip(a, b, strict=True))
 
 
-def steady(start: Vector, end: Vector, length: float, speed: float) -> Leg:
-    """The way between two postures in so much time as a way of this length takes."""
-    if length <= 1e-9:
-        return Leg(lambda _: end, trapezoid(0.0, 0.0, 0.0))
+class Geometry:
+    """The arm's kinematics, as ways in space need them."""
 
-    return Leg(lambda share: between(start, end, share), trapezoid(1.0, speed / length, ACCELERATION / length))
+    forward = staticmethod(forward)
+    inverse = staticmethod(inverse)
 
 
 def move_coords(registers: Registers, joints: Vector, value: c.CoordsMove) -> Activity:
-    """G0."""
+    """G0 and G1: straight; not begun if the way leaves the reach."""
     registers.speed = value.f or registers.speed
     here = pose(registers, joints)
     given = (value.x, value.y, value.z, value.e)
@@ -174,9 +205,13 @@ def move_coords(registers: Registers, joints: Vector, value: c.CoordsMove) -> Ac
     else:
         target = tuple(old if each is None else each for each, old in zip(given, here, strict=True))
 
-    end = inverse(plus(target, tuple(-each for each in registers.origin)))
-    length = max(Line(here, target).length, abs(target[3] - here[3]))
-    return travel([steady(joints, end, length, registers.speed)])
+    own = plus(target, tuple(-each for each in registers.origin))
+    pace = Pace((registers.speed,) * 2, (ACCELERATION,) * 2)
+    leg = curve_leg(Line(forward(joints), own), joints, Geometry(), pace)
+    if leg.fault:
+        raise leg.fault
+
+    return travel([leg])
 
 
 def move_joints(registers: Registers, joints: Vector, value: c.JointsMove) -> Activity:
@@ -234,7 +269,7 @@ def tool_jog(registers: Registers, joints: Vector, value: c.JogMove) -> Activity
 
     last = len(ways) - 1
     if not last:
-        return travel([steady(joints, joints, 0.0, speed)])
+        return travel([joint_leg(joints, joints, Pace((speed,) * 4, (ACCELERATION,) * 4))])
 
     def at(share: float) -> Vector:
         place = min(int(share * last), last - 1)
@@ -264,6 +299,7 @@ def register(registers: Registers, value: c.ServoValue) -> None:
 
 MOTIONS: Mapping[str, Move] = {
     c.MOVE_COORDS.name: move_coords,
+    c.MOVE_LINE.name: move_coords,
     c.MOVE_JOINTS.name: move_joints,
     c.MOVE_JOINT.name: move_joint,
     c.HOME.name: home,
@@ -275,13 +311,11 @@ SETTINGS: Mapping[str, Callable[[Registers, Any], None]] = {
     c.LASER_ON.name: setter("laser", value=True),
     c.LASER_OFF.name: setter("laser", value=False),
     c.SET_SPEED_MODE.name: lambda registers, value: setattr(registers, "speed_mode", int(value.mode)),
-    c.RELEASE.name: setter("powered", value=False),
     c.POWER_ON.name: setter("powered", value=True),
     c.SET_PWM.name: lambda registers, value: setattr(registers, "pwm", value.duty),
     c.PUMP_OFF.name: setter("pump", value=False),
     c.PUMP_ON.name: setter("pump", value=True),
     c.SET_GRIPPER_ZERO.name: setter("gripper", 0),
-    c.SET_GRIPPER.name: lambda registers, value: setattr(registers, "gripper", value.opening),
     c.RELEASE_GRIPPER.name: setter("gripper", None),
     c.FAN_ON.name: setter("fan", value=True),
     c.FAN_OFF.name: setter("fan", value=False),

@@ -63,6 +63,7 @@ class Status:
         text: What else it said.
         coords: Where it is, as it said with that: x, y, z and e; empty where it did not.
         angles: Its joints, if they were asked as well.
+        endstops: Its home switches.
     """
 
     queue_size: int
@@ -70,6 +71,7 @@ class Status:
     text: str = ""
     coords: tuple[float, ...] = field(default=(), compare=False)
     angles: tuple[float, ...] = field(default=(), compare=False)
+    endstops: tuple[float, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +115,8 @@ class StatusLayout:
         size, text = closing(ANGLES.sub(b"", ENDSTOP.sub(b"", data)))
         rest = MOVING_END.sub(b"", text)
         at_rest, text = rest != text, rest.strip()
-        return Status(size, at_rest, text.decode("ascii", "replace"), floats(COORDS, data), floats(ANGLES, data))
+        readings = (floats(pattern, data) for pattern in (COORDS, ANGLES, ENDSTOP))
+        return Status(size, at_rest, text.decode("ascii", "replace"), *readings)
 
 
 RECEIPT = ReceiptLayout()

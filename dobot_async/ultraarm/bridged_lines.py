@@ -33,6 +33,9 @@ from dobot_async.wire import Command
 __all__ = ["PATTERNS", "PREFIX", "Answers", "Line", "Requests", "fits", "understood", "words_of"]
 
 LONGEST_LINE = 256
+TOKEN = b"TOKEN "
+"""How the line begins that a client with a token sends first; a door that asks for none leaves it in the stream."""
+
 ASKED = 16  # requests that the arm has not answered
 NAMED = re.compile(rb"[A-Z0-9]\s*\[", re.IGNORECASE)
 PATTERNS: Mapping[bytes, re.Pattern[bytes]] = MappingProxyType(
@@ -72,7 +75,7 @@ class Line:
 
 
 class Requests:
-    """Finds the lines of a client, each with what closes its answer.
+    """Finds the lines of a client, each with what closes its answer; a token in front of them is left out.
 
     Attributes:
         junk_bytes: Bytes that are no text, and those of lines that never ended.
@@ -82,9 +85,12 @@ class Requests:
     def __init__(self) -> None:
         self.junk_bytes = self.bad_frames = 0
         self._buffer = b""
+        self._first = b""  # the bytes of the first line, until it is known to be a token or none
+        self._greeted = False
 
     def feed(self, data: bytes) -> list[Line]:
         """Take the next bytes, return the requests that they complete."""
+        data = data if self._greeted else self._without_token(data)
         *lines, rest = (self._buffer + printable(data).replace(b"\n", b"")).split(END)
         self._buffer = rest if len(rest) <= LONGEST_LINE else b""
         self.junk_bytes += len(rest) - len(self._buffer)
@@ -97,6 +103,21 @@ class Requests:
     def reset(self) -> None:
         """Forget half a line."""
         self._buffer = b""
+
+    def _without_token(self, data: bytes) -> bytes:
+        """The first bytes of a client without the line of its token."""
+        first = self._first + data
+        head = first[: len(TOKEN)]
+        if head == TOKEN[: len(head)] and len(first) <= LONGEST_LINE + len(TOKEN):
+            _, ended, rest = first.partition(b"\n")
+            if not ended:
+                self._first = first
+                return b""
+
+            first = rest if head == TOKEN else first
+
+        self._first, self._greeted = b"", True
+        return first
 
 
 class Answers:

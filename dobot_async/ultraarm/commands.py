@@ -6,7 +6,8 @@
     await arm.queue.put(c.MOVE_COORDS, c.CoordsMove(x=200, y=0, z=40, f=100))
 
 A row's name is the word that goes over the wire. `section` is the manual's heading, or "pymycobot" for what only the
-vendor's library knows. docs/ultraarm.md lists where the two disagree.
+vendor's library knows, "G-code programs" for what only programs for this arm have. docs/ultraarm.md lists where they
+disagree.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any, TypeVar
 from dobot_async.layouts import NOTHING
 from dobot_async.rows import Rows
 from dobot_async.ultraarm.answers import RECEIPT, STATUS, Bracket, Numbers, Receipt
-from dobot_async.ultraarm.layouts import Relative, Words
+from dobot_async.ultraarm.layouts import Relative, Whole, Words
 from dobot_async.ultraarm.params import *
 from dobot_async.wire import Command, Layout, Queueing
 
@@ -64,7 +65,8 @@ NEVER = Queueing.NEVER
 COORDS_MOVE = Words(CoordsMove)
 
 MOVE_COORDS = motion("G0", COORDS_MOVE, "coordinate control")
-WAIT = write("G4", Dwell, "wait (seconds)", Queueing.ALWAYS)
+MOVE_LINE = motion("G1", COORDS_MOVE, "G-code programs")  # in no manual, and in every program that is published
+WAIT = write("G4", Whole(Dwell), "wait (seconds)", Queueing.ALWAYS)
 GET_SYSTEM_VERSION = read("G6", Bracket[float]("GetSystemVersion", *plain(float)), "pymycobot")
 GET_MODIFY_VERSION = read("G7", Bracket[int]("GetModifyVersion", *plain(int)), "pymycobot")
 HOME = motion("G28", NOTHING, "back to zero point")

@@ -9,11 +9,12 @@ __all__ = ["FAMILY"]
 FAMILY = Family(
     public={
         "dobot_async.ultraarm.arm": ("UltraArm", "UltraArmJog"),
-        "dobot_async.ultraarm.params": ("UltraArmAngles", "UltraArmCoords", "UltraArmLimits"),
+        "dobot_async.ultraarm.params": ("UltraArmAngles", "UltraArmCoords", "UltraArmLimits", "UltraArmPose"),
     },
     simulator="dobot_async.simulator.ultraarm:SimulatedUltraArm",
     bridge="dobot_async.ultraarm.bridged:BRIDGED",
     discovery="dobot_async.discovery.families:ULTRAARM",
-    cli="dobot_async.cli.families:ULTRAARM",
+    cli="dobot_async.cli.arms.ultraarm:ULTRAARM",
     fleet="dobot_async.fleet.families:ULTRAARM",
+    program="dobot_async.ultraarm.vocabulary:VOCABULARY",
 )

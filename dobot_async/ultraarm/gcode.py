@@ -2,14 +2,16 @@
 
     ; a comment                    (another one)
     G90
-    G1 X200 Y0 Z40 F100            G1 is sent as G0: the arm has one kind of motion
+    G1 X200 Y0 Z40 F100            G0 and G1 are sent as they are
     X210                           a line of axes alone goes on with the motion before it, at its F
+    G4 S0.5                        the arm waits whole seconds, the rest passes on this side
     M3
     M30                            ends the program, as M2 does
 
 Line numbers (N10) and checksums (*71) count for nothing, nor do G17, G21, G40, G49, G80 and G94, which say what is so
 anyway. F is mm/s, as the arm has it, not mm/min. What the arm has no command for is an error, and so is what asks it
-something. A program begins in absolute coordinates, and leaves the arm in them.
+something, a letter twice in one command, and a comment that is not closed in its line. A % stands alone on its line. A
+program begins in absolute coordinates, and leaves the arm in them, whatever becomes of it.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import AsyncIterator, Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,40 +28,27 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import DobotError, MotionStopped, ProtocolError
+from dobot_async.program.step import ProgramError
+from dobot_async.program.step import Step as GCodeLine
+from dobot_async.program.text import lines_in, read_text, shortened
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.frame import split_words
+from dobot_async.ultraarm.gcode_text import bare
+from dobot_async.ultraarm.goals import AXES, INCREMENTS
 from dobot_async.ultraarm.layouts import Words
 from dobot_async.wire import Command, Queueing
 
 __all__ = ["GCodeLine", "GCodeRun", "Source", "parse_gcode"]
 
 Source = str | os.PathLike[str] | Iterable[str]
-COMMENT = re.compile(r"\([^)]*\)|;.*|%|\*\d+\s*$")
 EXPONENT = re.compile(r"\de[-+]?\d")
 IGNORED = {"G17", "G21", "G40", "G49", "G80", "G94"}
 ENDING = {"M2", "M30"}
-AXES = ("x", "y", "z", "e")
 MOVING = "XYZEF"
+DWELL = Words(c.Dwell)
+"""What a program may say behind G4: fractions too."""
 
-
-@dataclass(frozen=True, slots=True)
-class GCodeLine:
-    """One command of a program, checked.
-
-    Attributes:
-        number: Of its line, from 1; 0 for what the program did not ask for itself.
-        text: Of its line.
-        command: The row of the table.
-        value: Its parameters.
-    """
-
-    number: int
-    text: str
-    command: Command[Any, Any]
-    value: Any
-
-    def __str__(self) -> str:
-        return f"line {self.number} ({self.text})"
+MODES = {c.ABSOLUTE: False, c.RELATIVE: True}
 
 
 def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> tuple[GCodeLine, ...]:
@@ -66,28 +56,28 @@ def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> t
 
     Args:
         source: A file's path, or lines.
-        limits: What the arm may be told. Increments are looked at where it is known from where.
+        limits: What the arm may be told. Of increments the goal is looked at, where it is known from where.
 
     Raises:
-        ValueError: Lines are wrong; the message has each with its number.
+        ProgramError: Lines are wrong; the message has each with its number.
+        ValueError: The file is not UTF-8 text.
         OSError: The file cannot be read.
     """
     reader = Reader(limits)
     found: list[GCodeLine] = []
     wrong = []
     for number, written in enumerate(lines_of(source), 1):
-        text = COMMENT.sub(" ", written).strip()
         try:
-            for command, value in reader.read(text):
+            for command, value in reader.read(bare(written)):
                 found.append(GCodeLine(number, written.strip(), command, value))
         except (ValueError, TypeError, ProtocolError) as error:
-            wrong.append(f"line {number}: {error}")
+            wrong.append((number, str(error)))
 
         if reader.ended:
             break
 
     if wrong:
-        raise ValueError("\n".join(wrong))
+        raise ProgramError(wrong)
 
     return tuple(found)
 
@@ -95,7 +85,7 @@ def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> t
 def lines_of(source: Source) -> Iterable[str]:
     """Return the lines of a program."""
     if isinstance(source, (str, os.PathLike)):
-        return Path(source).read_text(encoding="utf-8-sig").splitlines()
+        return lines_in(read_text(Path(source)))
 
     return source
 
@@ -111,7 +101,7 @@ class Reader:
         self.ended = False
         self._limits = limits
         self._relative = False
-        self._moves = False
+        self._motion = ""  # what a line of axes alone goes on with
         self._speed: float | None = None
         self._here: dict[str, float | None] = dict.fromkeys(AXES)
 
@@ -129,24 +119,29 @@ class Reader:
                 return
 
             command = row_of(name)
-            value = command.request.decode("".join(letters).encode("ascii"))
+            letters_only = [each[0] for each in letters]
+            if len({*letters_only}) < len(letters):
+                raise ValueError(f"{name} has a letter twice")
+
+            layout = DWELL if command is c.WAIT else command.request
+            value = layout.decode("".join(letters).encode("ascii"))
             if isinstance(value, c.CoordsMove) and all(getattr(value, axis) is None for axis in AXES):
                 self._speed = value.f
                 continue
 
             value = self._checked(command, value)
-            self._moves = self._moves or command is c.MOVE_COORDS
+            self._motion = name if command in INCREMENTS else self._motion
             yield command, value
 
     def _groups(self, text: str) -> Iterator[tuple[str, list[str]]]:
         """Yield the commands of a line, each with its own words."""
         if EXPONENT.search(text):
-            raise ValueError(f"{text!r} has an exponent, which the arm would read as its fourth axis")
+            raise ValueError(f"{shortened(text)!r} has an exponent, which the arm would read as its fourth axis")
 
         try:
             words = split_words(text.encode("ascii"))
         except ValueError:
-            raise ValueError(f"{text!r} is no G-code") from None
+            raise ValueError(f"{shortened(text)!r} is no G-code") from None
 
         groups: list[tuple[str, list[str]]] = []
         for letter, number in words:
@@ -157,8 +152,8 @@ class Reader:
                 groups.append((f"{letter}{int(number)}" if number.isdigit() else letter + number, []))
             elif groups:
                 groups[-1][1].append(letter + number)
-            elif letter in MOVING and self._moves:
-                groups.append(("G0", [letter + number]))
+            elif letter in MOVING and self._motion:
+                groups.append((self._motion, [letter + number]))
             else:
                 raise ValueError(f"{letter}{number} belongs to no command")
 
@@ -171,11 +166,11 @@ class Reader:
             value = replace(value, f=self._speed)
 
         command.request.encode(value)
-        if command is c.MOVE_COORDS:
+        if command in INCREMENTS:
             self._move(value)
         else:
             self._limits.check(value)
-            self._relative = {c.ABSOLUTE: False, c.RELATIVE: True}.get(command, self._relative)
+            self._relative = MODES.get(command, self._relative)
             if command is c.SET_POSITION:
                 self._here |= {axis: at for axis in AXES if (at := getattr(value, axis)) is not None}
             elif command.moves or command is c.RELEASE:
@@ -197,7 +192,7 @@ class Reader:
 
 def row_of(name: str) -> Command[Any, Any]:
     """Return the row of a word; raise ValueError where a program cannot have it."""
-    command = c.BY_WORD.get("G0" if name == "G1" else name)
+    command = c.BY_WORD.get(name)
     if command is None:
         raise ValueError(f"the arm has no command {name}")
 
@@ -233,7 +228,7 @@ class GCodeRun:
         progress: Callable[[int, int], None] | None = None,
     ) -> None:
         before = [GCodeLine(0, "G90", c.ABSOLUTE, None)]
-        after = [GCodeLine(0, "G90", c.ABSOLUTE, None)] if ends_relative(lines) else []
+        after = [GCodeLine(0, "G90", c.ABSOLUTE, None)]
         if constant_speed:
             before.append(GCodeLine(0, "M16 S0", c.SET_SPEED_MODE, c.ModeOfSpeed(c.SpeedMode.CONSTANT)))
             after.append(GCodeLine(0, "M16 S2", c.SET_SPEED_MODE, c.ModeOfSpeed(c.SpeedMode.RAMPED)))
@@ -243,6 +238,7 @@ class GCodeRun:
         self._cleanup = cleanup
         self._todo = [*before, *lines, *after] if send and lines else []
         self._progress = progress
+        self._constant_speed = constant_speed
 
     def __await__(self) -> Generator[Any, None, None]:
         return self._run().__await__()
@@ -266,6 +262,7 @@ class GCodeRun:
                             yield line
         except DobotError as error:
             error.add_note(str(self._failed(motions)))
+            self._ramp()
             raise
         except BaseException as error:  # a cancellation, or who iterates has left; or `progress` has failed
             stopped = MotionStopped("the program that it belonged to was cancelled, or left")
@@ -273,7 +270,17 @@ class GCodeRun:
             if failure:
                 error.add_note(str(failure))
 
+            self._ramp()
             raise
+
+    def _ramp(self) -> None:
+        """Go back to ramps, behind the stop that ends the program before it does so itself."""
+        if self._constant_speed:
+            self._cleanup.start(self._back_to_ramps(), "going back to ramps")
+
+    async def _back_to_ramps(self) -> None:
+        with suppress(DobotError):
+            await (await self._queue.put(c.SET_SPEED_MODE, c.ModeOfSpeed(c.SpeedMode.RAMPED)))
 
     async def _run(self) -> None:
         async for _ in self:
@@ -290,9 +297,3 @@ class GCodeRun:
                 return line
 
         return self._todo[min(len(motions), len(self._todo) - 1)]
-
-
-def ends_relative(lines: Sequence[GCodeLine]) -> bool:
-    """Return whether increments are what coordinates mean at the end."""
-    modes = [line.command for line in lines if line.command in {c.ABSOLUTE, c.RELATIVE}]
-    return bool(modes) and modes[-1] is c.RELATIVE

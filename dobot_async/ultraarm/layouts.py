@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from dobot_async.errors import ProtocolError
 from dobot_async.layouts import NOTHING
 from dobot_async.ultraarm.frame import split_words
 
-__all__ = ["Also", "Letter", "Relative", "Words", "number"]
+__all__ = ["Also", "Letter", "Relative", "Whole", "Words", "number"]
 
 T = TypeVar("T")
 
@@ -129,6 +129,24 @@ def field_of(name: str, annotation: Any) -> Field:
     kinds = [each for each in choices if each is not type(None)]
     kind, letter = get_args(kinds[0])
     return Field(name, letter, kind, optional=len(kinds) < len(choices))
+
+
+class Whole(Words[T]):
+    """Words of which the arm knows whole numbers alone: what stands behind the point is not sent."""
+
+    def encode(self, value: T) -> bytes:
+        """Return the words, rounded down."""
+        super().encode(value)
+        whole: Any = {field.name: math.floor(getattr(value, field.name)) for field in self.fields}
+        return super().encode(replace(value, **whole))  # type: ignore[type-var]
+
+    def decode(self, data: bytes) -> T:
+        """Read whole numbers."""
+        value = super().decode(data)
+        if any(getattr(value, field.name) % 1 for field in self.fields):
+            raise ProtocolError(f"{data!r} is no whole number")
+
+        return value
 
 
 class Relative(Generic[T]):

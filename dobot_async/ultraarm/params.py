@@ -42,6 +42,7 @@ __all__ = [
     "UltraArmAngles",
     "UltraArmCoords",
     "UltraArmLimits",
+    "UltraArmPose",
 ]
 
 Speed = Annotated[float, Letter("F", 1, 200)]
@@ -139,9 +140,9 @@ class JogMove:
 
 @dataclass(frozen=True, slots=True)
 class Dwell:
-    """Whole seconds to wait; the vendor's library sends no others. Manual 5, wait."""
+    """Seconds to wait. The arm knows whole ones; the driver waits the rest itself. Manual 5, wait."""
 
-    seconds: Annotated[int, Letter("S", 0, 65535, whole=True)]
+    seconds: Annotated[float, Letter("S", 0, 65535)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,9 +154,9 @@ class ModeOfSpeed:
 
 @dataclass(frozen=True, slots=True)
 class ModeOfGripper:
-    """Which mode of the force gripper is asked about."""
+    """Which mode of the force gripper is asked about; None for another gripper, of which M50 alone tells."""
 
-    mode: Annotated[GripperMode, Letter("T", 1, 3, whole=True)]
+    mode: Annotated[GripperMode, Letter("T", 1, 3, whole=True)] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,8 +234,27 @@ class UltraArmCoords:
 
 
 @dataclass(frozen=True, slots=True)
+class UltraArmPose:
+    """Where the arm is, all of it read at one time; a target of `move_to`.
+
+    Attributes:
+        x: mm, forward.
+        y: mm, to the left.
+        z: mm, up.
+        e: Degrees, of what is mounted on the fourth joint; 0 where nothing is.
+        joints: The four joints, degrees.
+    """
+
+    x: float
+    y: float
+    z: float
+    e: float
+    joints: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Endstops:
-    """The home switches of the joints, as the arm tells them: 0 or 1. No source says which of them means pressed."""
+    """The home switches of the joints, as the arm tells them, 0 or 1: the manual's example has 1 for all of them."""
 
     j1: int
     j2: int
@@ -266,7 +286,7 @@ class UltraArmLimits:
     j4: Range
 
     def check(self, value: object) -> None:
-        """Raise ValueError for a target that is beyond the limits; increments are not looked at."""
+        """Raise ValueError for a target that is beyond the limits."""
         if isinstance(value, JointMove):
             self._check_axis(f"j{value.joint}", value.angle)
             return

@@ -1,4 +1,4 @@
-"""The ultraArm's queue with the verbs on it, and its batches."""
+"""The ultraArm's queue with the verbs on it, and its batches. It is on this side: see `_core.queue.host`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from contextlib import AbstractAsyncContextManager
 from typing import Any, TypeVar
 
 from dobot_async._core.queue.batch import BatchBuilder, batch
-from dobot_async._core.queue.executor import Executor
+from dobot_async._core.queue.host import HostExecutor, HostQueue
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async.ultraarm.verbs import Pump, Verbs
@@ -18,10 +18,10 @@ __all__ = ["UltraArmBatch", "UltraArmQueue"]
 Q = TypeVar("Q")
 
 
-class UltraArmQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
-    """The arm's queue: each verb returns a Motion once the arm has accepted it, and waits while the queue is full."""
+class UltraArmQueue(HostQueue, Verbs[Coroutine[Any, Any, Motion]]):
+    """What is put here the arm is given in order, each once the one before it was seen to be done."""
 
-    def __init__(self, executor: Executor, pump: Pump) -> None:
+    def __init__(self, executor: HostExecutor, pump: Pump) -> None:
         super().__init__(executor)
         self.pump = pump
 
@@ -33,7 +33,7 @@ class UltraArmQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
         """Collect commands, and queue them with nothing between them when the block ends; an error sends none.
 
         Args:
-            timeout: Seconds to wait for room in the arm's queue.
+            timeout: Seconds to wait for room in the queue.
 
         Raises:
             DobotError: As `put`; what was accepted before that is pending.
@@ -42,7 +42,7 @@ class UltraArmQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
 
 
 class UltraArmBatch(BatchBuilder, Verbs[Motion]):
-    """Commands that are sent together; each verb returns its Motion, which may be awaited after the batch's block."""
+    """Commands that are queued together; each verb returns its Motion, to be awaited after the batch's block."""
 
     def __init__(self, queue: MotionQueue, pump: Pump) -> None:
         super().__init__(queue)

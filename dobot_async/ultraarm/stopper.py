@@ -11,25 +11,22 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from types import MappingProxyType
-from typing import Any, Literal
+from typing import Literal
 
 from dobot_async.errors import CommandRejected
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.answers import Status
 from dobot_async.ultraarm.layouts import Also
+from dobot_async.ultraarm.state import ArmState
 from dobot_async.ultraarm.status import PACE, RESTS, StatusPoller
-from dobot_async.wire import Command
 
 __all__ = ["Stopper"]
 
 BRAKING = 5  # polls of an arm that was told to stop
 GIVING_UP = 50  # polls of an arm without power, after which it counts as one that cannot be stopped
 AGAIN = 10  # polls after which the power is taken off again: some firmware queues that
-POWERING: Mapping[Command[Any, Any], bool] = MappingProxyType({c.RELEASE: True, c.POWER_ON: False})
-"""Whether the motors have no power after a command."""
 STOP_AND_STATUS = replace(c.GET_STATUS, request=Also("M15"), write=True)
 RELEASE_AND_STATUS = replace(c.GET_STATUS, request=Also("M17"), write=True)
 
@@ -39,20 +36,14 @@ class Stopper:
 
     Args:
         status: Polls the arm.
+        state: What is noted of its power.
         on_stop: What to do where M15 does not end a motion.
-
-    Attributes:
-        released: Whether the motors have no power, as far as this program knows.
     """
 
-    def __init__(self, status: StatusPoller, on_stop: Literal["release", "finish"]) -> None:
-        self.released = False
+    def __init__(self, status: StatusPoller, state: ArmState, on_stop: Literal["release", "finish"]) -> None:
         self._status = status
+        self._state = state
         self._on_stop = on_stop
-
-    def note(self, command: Command[Any, Any]) -> None:
-        """Note what a command that the arm has taken means."""
-        self.released = POWERING.get(command, self.released)
 
     async def stop(self) -> None:
         """Return when the arm is seen to stand, with nothing in its queue.
@@ -68,7 +59,7 @@ class Stopper:
             while not await self._comes_to_rest(GIVING_UP):
                 pass
         else:
-            self.released = True
+            self._state.note(c.RELEASE, None)
             if not await self._comes_to_rest(GIVING_UP, release=True):
                 raise CommandRejected(
                     f"the arm goes on, with {self._status.size} more commands in its queue: its protocol has nothing "

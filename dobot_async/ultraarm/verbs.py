@@ -5,8 +5,9 @@
     batch.move_to(...)        returns a Motion that is sent with its batch
 
 Lengths are mm, angles degrees, times seconds. `speed` is what the manual calls mm/s, 1 to 200; None leaves it to the
-arm. Wrong arguments raise ValueError or TypeError at once. The arm runs everything in order, settings included.
-`timeout` is the whole command's on the arm, the wait for room in the queue; a batch has its own.
+arm. Wrong arguments raise ValueError or TypeError at once. Everything is done in order, settings included, and nothing
+before what is in front of it was seen to be done. `timeout` is the whole command's on the arm, the wait for room in the
+queue; a batch has its own.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ SPEED = 50.0
 
 SLOWEST, FASTEST = 1.0, 200.0
 LONGEST_WAIT = 65535.0
+FULLY = 100.0
 
 Pump = Literal["manual", "vendor"]
 """Whether M23 starts the pump, as the manual says, or M22, as the vendor's library has it."""
@@ -52,7 +54,7 @@ class Verbs(Generic[T]):
 
     def move_to(
         self,
-        x: float | None = None,
+        x: float | c.UltraArmPose | c.UltraArmCoords | None = None,
         y: float | None = None,
         z: float | None = None,
         e: float | None = None,
@@ -63,13 +65,20 @@ class Verbs(Generic[T]):
         """Move the tool to a point; an axis that is not given stays. Manual 5, G0.
 
         Args:
-            x: mm, forward.
+            x: mm, forward; or a whole pose, as `get_pose` and `get_coords` return it.
             y: mm, to the left.
             z: mm, up.
             e: Degrees, of what is mounted on the fourth joint.
             speed: mm/s, 1 to 200.
             timeout: Seconds.
         """
+        if isinstance(x, (c.UltraArmPose, c.UltraArmCoords)):
+            if not (y is None and z is None and e is None):
+                raise ValueError("give a pose, or coordinates, not both")
+
+            pose = x
+            x, y, z, e = pose.x, pose.y, pose.z, pose.e
+
         return self.perform(c.MOVE_COORDS, c.CoordsMove(*some(x, y, z, e), f=check_speed(speed)), timeout)
 
     def move_by(
@@ -82,7 +91,11 @@ class Verbs(Generic[T]):
         speed: float | None = SPEED,
         timeout: float | None = None,
     ) -> T:
-        """Move the tool by mm (and `e` by degrees) from where it will be then. Manual 5, G91, G0 and G90."""
+        """Move the tool by mm (and `e` by degrees) from where it is then.
+
+        The sum has to be within the limits: ValueError where that shows at once, else CommandRejected when its turn
+        comes, before it is sent. Sent as a place, as `move_to` is.
+        """
         return self.perform(c.MOVE_BY, c.CoordsMove(*some(x, y, z, e), f=check_speed(speed)), timeout)
 
     def move_joints(
@@ -103,13 +116,13 @@ class Verbs(Generic[T]):
         return self.perform(c.MOVE_JOINT, c.JointMove(joint, angle, check_speed(speed)), timeout)
 
     def wait(self, seconds: float, *, timeout: float | None = None) -> T:
-        """Hold the arm's queue for a time. Manual 5, G4.
+        """Hold the queue for a time. Manual 5, G4.
 
         Args:
-            seconds: 0 to 65535; the arm knows whole ones alone.
+            seconds: 0 to 65535. The arm waits whole ones, and the rest passes on this side before the next command.
             timeout: Seconds.
         """
-        return self.perform(c.WAIT, c.Dwell(whole_seconds(seconds)), timeout)
+        return self.perform(c.WAIT, c.Dwell(check_duration(seconds, "seconds", LONGEST_WAIT)), timeout)
 
     def set_position(
         self,
@@ -124,11 +137,14 @@ class Verbs(Generic[T]):
         return self.perform(c.SET_POSITION, c.Position(*some(x, y, z, e)), timeout)
 
     def absolute(self, *, timeout: float | None = None) -> T:
-        """Let `move_to` mean places, as it does unless told otherwise. Manual 5, G90."""
+        """Let `move_to` mean places, as it does unless told otherwise, and after a stop. Manual 5, G90."""
         return self.perform(c.ABSOLUTE, None, timeout)
 
     def relative(self, *, timeout: float | None = None) -> T:
-        """Let `move_to` mean increments, until `absolute` or `move_by`. Manual 5, G91."""
+        """Let `move_to` mean increments, until `absolute` or a stop.
+
+        They are added up on this side; the arm itself is never left in G91.
+        """
         return self.perform(c.RELATIVE, None, timeout)
 
     def set_speed_mode(self, mode: c.SpeedMode, *, timeout: float | None = None) -> T:
@@ -140,24 +156,38 @@ class Verbs(Generic[T]):
         starts = bool(on) == (self.pump == "manual")
         return self.perform(c.PUMP_ON if starts else c.PUMP_OFF, None, timeout)
 
-    def gripper(
+    def gripper(self, closed: bool, *, speed: int = 200, timeout: float | None = None) -> T:
+        """Close the gripper, or open it wide; see `gripper_to`. Manual 5, M25.
+
+        Args:
+            closed: Whether to close it.
+            speed: 0 to 1500.
+            timeout: Seconds.
+        """
+        return self.gripper_to(0 if closed else 100, speed=speed, timeout=timeout)
+
+    def gripper_to(
         self,
-        opening: int,
+        percent: SupportsFloat,
         *,
         speed: int = 200,
         kind: c.GripperType | None = None,
         mode: c.GripperMode | None = None,
         timeout: float | None = None,
     ) -> T:
-        """Open the gripper to 0 (closed) to 100. Manual 5, M25.
+        """Open the gripper to 0 (closed) to 100 percent. Manual 5, M25.
+
+        Done when it rests, at its opening or on what it holds, by firmware that tells where it is (M50); by other
+        firmware when the arm has begun it.
 
         Args:
-            opening: Percent.
+            percent: 0 to 100, rounded to whole ones.
             speed: 0 to 1500; 1 to 65 for the force gripper.
             kind: Which gripper, for firmware that knows several.
             mode: How the force gripper grips.
             timeout: Seconds.
         """
+        opening = round(check_duration(percent, "percent", FULLY))
         return self.perform(c.SET_GRIPPER, c.GripperSet(opening, speed, kind, mode), timeout)
 
     def release_gripper(self, *, timeout: float | None = None) -> T:
@@ -191,15 +221,6 @@ def check_speed(speed: SupportsFloat | None) -> float | None:
         raise ValueError(f"speed must be in {SLOWEST:g} to {FASTEST:g} mm/s, not {speed!r}")
 
     return found
-
-
-def whole_seconds(seconds: SupportsFloat) -> int:
-    """Return whole seconds to wait; raise ValueError or TypeError for others."""
-    found = check_duration(seconds, "seconds", LONGEST_WAIT)
-    if not found.is_integer():
-        raise ValueError(f"seconds must be whole, for the arm waits no others, not {seconds!r}")
-
-    return int(found)
 
 
 def some(x: Axis, y: Axis, z: Axis, e: Axis) -> tuple[Axis, Axis, Axis, Axis]:

@@ -94,6 +94,7 @@ async def side_by_side(requests: int, seed: int = 1) -> tuple[Figures, Rig]:
     """Runs both programs at the same time; returns what came of it."""
     async with bridged(["pty", TCP]) as rig:
         for pin in PINS:
+            rig.sim.arm.state.set(c.SET_IO_MULTIPLEXING, c.IOMultiplexing(pin, c.IOFunction.ADC))
             rig.sim.arm.set_adc(pin, value_at(pin))
 
         port = rig.bridge.urls[0].removeprefix("serial://")

@@ -111,6 +111,7 @@ async def test_who_asks_is_answered_and_nobody_else() -> None:
     """Two programs read the same registers of the same addresses, pipelined; the answers are in their own order."""
     async with bridged() as rig, client(rig.url) as one, client(rig.url) as other:
         for address in range(1, 21):
+            rig.sim.arm.state.set(c.SET_IO_MULTIPLEXING, c.IOMultiplexing(address, c.IOFunction.ADC))
             rig.sim.arm.set_adc(address, 100 * address)
 
         async def read(plain: Plain, addresses: list[int]) -> None:
@@ -310,6 +311,32 @@ async def test_a_stop_overtakes_and_drops_what_waits() -> None:
         assert rig.sim.arm.device.left_space >= 31
         await until(lambda: rig.told("refused"))
         assert len(rig.told("refused")) == 1
+
+
+async def test_anybody_may_switch_off_what_burns_and_drops_nothing_of_the_mover() -> None:
+    laser, motors = c.EndEffectorLaser(True, True), [c.EMotor(index, False, 0) for index in (0, 1)]
+    async with bridged(speed=1.0) as rig, client(rig.url) as mover, client(rig.url) as other:
+        await mover.ask(c.SET_QUEUED_CMD_START_EXEC)
+        await mover.ask(c.SET_END_EFFECTOR_LASER, laser)
+        for index in (0, 1):
+            await mover.ask(c.SET_E_MOTOR, c.EMotor(index, True, 100))
+
+        rig.sim.faults.latency = 0.01
+        await mover.send(*[far(place) for place in range(5)])
+        await other.send(
+            ask(c.SET_END_EFFECTOR_LASER, c.EndEffectorLaser(False, False)),
+            *(ask(c.SET_E_MOTOR, off) for off in motors),
+        )
+        for _ in range(3):
+            await other.receive()
+
+        assert not rig.sim.arm.laser
+        assert [motor.speed for motor in rig.sim.arm.motors] == [0, 0]
+        for _ in range(5):
+            assert (await mover.receive()).id == far().id
+
+        assert not rig.told("refused")
+        assert not rig.told("cut")
 
 
 async def test_anybody_may_stop_and_whose_motion_it_was_is_told() -> None:

@@ -86,10 +86,13 @@ async def test_json_is_one_object_with_a_made_up_token(sim: Simulation) -> None:
     async with started(sim.url, "tcp://0.0.0.0:0", before=("--json",)) as process:
         answer = json.loads(await line(process))
         (url,) = answer["urls"]
+        assert "0.0.0.0" not in url
         assert len(answer["token"]) >= 32
         async with Magician.connect(f"{url}?token={answer['token']}", control=False) as arm:
             assert (await arm.get_info()).name == "Dobot Magician"
 
+        events = [json.loads(await line(process)) for _ in range(2)]
+        assert [event["what"] for event in events] == ["connected", "left"]
         process.send_signal(signal.SIGTERM)
         output, errors = await process.communicate()
         assert (process.returncode, output, errors) == (143, b"", b"")

@@ -17,8 +17,8 @@ import pytest
 from click.testing import CliRunner
 
 from dobot_async import Magician
-from dobot_async.cli.cell import observe
 from dobot_async.cli.cell_program import parse_cell_program
+from dobot_async.cli.cell_watch import observe
 from dobot_async.cli.main import cli
 from dobot_async.fleet.cell import parse_cell, read_cell
 from dobot_async.magician import commands as c
@@ -93,6 +93,10 @@ async def run(*arguments: str | Path) -> tuple[int, str, str]:
     return process.returncode, output.decode(), errors.decode()
 
 
+def rewrite(file: Path, old: str, new: str) -> None:
+    file.write_text(file.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+
+
 def places(sim: Simulation) -> list[tuple[float, float]]:
     return [(each.value.x, each.value.y) for each in sim.arm.executed if each.command is c.SET_PTP_CMD]
 
@@ -133,17 +137,66 @@ async def test_run(file: Path, arms: dict[str, Simulation], tmp_path: Path) -> N
     assert places(arms["right"]) == [(200, -120), (250, 0)]
 
 
-@pytest.mark.parametrize(("line", "code"), [("joints 0 120 0 0", 1), ("move 200 -120 600", 2)])
 async def test_run_tells_the_line_of_a_failure_and_stops_all(
-    file: Path, arms: dict[str, Simulation], tmp_path: Path, line: str, code: int
+    file: Path, arms: dict[str, Simulation], tmp_path: Path
 ) -> None:
     program = tmp_path / "program.txt"
-    program.write_text(f"right: wait 600\nleft: move 200 -120 20\nleft: {line}\n", encoding="utf-8")
-    ended, _, errors = await run("cell", file, "run", program)
-    assert ended == code
-    assert errors.splitlines()[-1].lower().startswith("error: left")
-    assert f"line 3 ({line}): " in errors
+    program.write_text("right: wait 600\nthird: wait 600\nleft: wait 0.1\nleft: by 0 0 600\n", encoding="utf-8")
+    rewrite(file, 'guard = "wait"', "")
+    code, _, errors = await run("cell", file, "run", program)
+    assert code == 1
+    assert errors.count("\n") == 1
+    assert errors.startswith("error: left, line 4 (by 0 0 600): left: the arm raised alarms: ")
     assert [name for name, sim in arms.items() if sim.arm.device.executing] == []
+
+
+async def test_what_the_guard_refuses_under_way_is_a_failure_and_not_wrong_usage(
+    file: Path, arms: dict[str, Simulation], tmp_path: Path
+) -> None:
+    program = tmp_path / "program.txt"
+    program.write_text("left: move 200 -180 20\nleft: wait 0.01\nleft: move 200 180 20\n", encoding="utf-8")
+    limits = 'guard = "wait"\nlimits = { x = [190, 265] }'
+    rewrite(file, 'guard = "wait"', limits)
+    code, _, errors = await run("cell", file, "run", program)
+    assert (code, errors.count("\n")) == (1, 1)
+    assert errors.startswith("error: left, line 3 (move 200 180 20): ")
+
+
+@pytest.mark.parametrize(
+    ("lines", "number"),
+    [
+        (["left: move 200 0 50", "left: fly", "right: home"], 2),
+        (["left: home", "third: suction on", "third: move 900 0 0"], 3),
+        (["*: home", "*: joints 1 2"], 2),
+        (["left: move 200 0 50", "right: move 200 0 600"], 2),
+        (["left: move 200 0 50", "left: by 0 0 400"], 2),
+        (["left: move 200 0 50 l=100"], 1),
+        (["left: wait 1", "left: leave bin"], 2),
+        (["left: wait 1", "left: tool pen"], 2),
+        (["left, right: barrier x", "left: barrier x"], 2),
+        (["left:"], 1),
+    ],
+    ids=str,
+)
+async def test_a_wrong_line_is_one_line_of_errors_and_nothing_is_sent_to_any_arm(
+    file: Path, arms: dict[str, Simulation], tmp_path: Path, lines: list[str], number: int
+) -> None:
+    program = tmp_path / "program.txt"
+    program.write_text("\n".join(lines), encoding="utf-8")
+    code, output, errors = await run("--json", "cell", file, "run", program)
+    assert (code, output) == (2, "")
+    assert errors.count("\n") == 1
+    assert errors.startswith(f"error: {program}: line {number}: ")
+    assert [sim.arm.counters.requests for sim in arms.values()] == [0, 0]
+
+
+async def test_dry_run_sends_nothing(file: Path, arms: dict[str, Simulation], tmp_path: Path) -> None:
+    program = tmp_path / "program.txt"
+    program.write_text(PROGRAM, encoding="utf-8")
+    code, output, errors = await run("--json", "cell", file, "run", program, "--dry-run")
+    assert (code, errors) == (0, "")
+    assert json.loads(output)["sent"] is False
+    assert [sim.arm.counters.requests for sim in arms.values()] == [0, 0]
 
 
 async def test_ctrl_c_stops_all(file: Path, arms: dict[str, Simulation], tmp_path: Path) -> None:
@@ -180,8 +233,8 @@ async def test_watch_draws_every_arm(file: Path) -> None:
 
 
 async def test_watch_says_what_is_wrong_with_an_arm_and_does_not_wait_for_it() -> None:
-    cell = parse_cell('[arms.left]\nurl = "nonsense"\n')
-    with pytest.raises(ValueError, match="no scheme"):
+    cell = parse_cell('[arms.left]\nurl = "sim:?fast=1"\n')
+    with pytest.raises(ValueError, match="fast"):
         await asyncio.wait_for(observe(cell, 50, 1, lambda _: None), 30)
 
 
@@ -197,9 +250,8 @@ CELL_TEXT = CELL.format(left="sim:", right="sim:")
         ("left: zone nowhere", "no zone 'nowhere'; there are: bin"),
         ("left: barrier", "expected: barrier NAME"),
         ("left: move 1 2", "expected: move X Y Z"),
-        ("third: path 1 2 3", "no verb 'path' for third"),
-        ("third: move a", "'a' is not what it takes"),
-        ("", "it has no commands"),
+        ("third: path 1 2 3", "no verb 'path' for the ultraArm"),
+        ("third: move a 0 0", "x is a number, not 'a'"),
     ],
 )
 def test_wrong_programs(line: str, why: str) -> None:

@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 import pytest
 from click.testing import CliRunner
 
-from dobot_async import Command, Magician
+from dobot_async import Command, Magician, Pen
 from dobot_async.cli.main import cli
-from dobot_async.cli.program import Step, parse
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import Parser
+from dobot_async.program import VOCABULARIES
 from dobot_async.simulator import Simulation, simulate
 
 MODULE = (sys.executable, "-W", "error", "-m", "dobot_async")
@@ -245,7 +245,6 @@ async def test_an_alarm_is_one_line_and_with_json_an_object(sim: Simulation) -> 
         ["--url", "sim:", "jog", "x+", "-1"],
         ["--url", "sim:", "suction", "maybe"],
         ["--url", "sim:", "run", "/nowhere/at/all"],
-        ["--url", "sim:", "run", os.devnull],
         ["--url", "tcp://127.0.0.1:1", "demo"],
         ["--url", "sim:", "demo", "--speed", "2"],
         ["monitor", "--rate", "0"],
@@ -310,12 +309,11 @@ async def test_a_program_is_executed_in_order(sim: Simulation, tmp_path: Path) -
     ("line", "command", "value"),
     [
         ("home", c.SET_HOME_CMD, c.HOMECmd()),
-        ("move 1 -2 3.5 4 mode=jump", c.SET_PTP_CMD, c.PTPCmd(c.PTPMode.JUMP_XYZ, 1, -2, 3.5, 4)),
-        ("move 1 2 3 l=100", c.SET_PTP_WITH_L_CMD, c.PTPWithLCmd(c.PTPMode.MOVJ_XYZ, 1, 2, 3, 0, 100)),
+        ("move 200 -2 3.5 4 mode=jump", c.SET_PTP_CMD, c.PTPCmd(c.PTPMode.JUMP_XYZ, 200, -2, 3.5, 4)),
         ("joints 1 2 3 4", c.SET_PTP_CMD, c.PTPCmd(c.PTPMode.MOVJ_ANGLE, 1, 2, 3, 4)),
         ("by 0 0 -5", c.SET_PTP_CMD, c.PTPCmd(c.PTPMode.MOVL_INC, 0, 0, -5)),
-        ("path 1 2 3", c.SET_CP_CMD, c.CPCmd(c.CPMode.ABSOLUTE, 1, 2, 3)),
-        ("engrave 1 2 3 40", c.SET_CPLE_CMD, c.CPLECmd(c.CPMode.ABSOLUTE, 1, 2, 3, 40)),
+        ("path 200 2 3", c.SET_CP_CMD, c.CPCmd(c.CPMode.ABSOLUTE, 200, 2, 3)),
+        ("engrave 200 2 3 40", c.SET_CPLE_CMD, c.CPLECmd(c.CPMode.ABSOLUTE, 200, 2, 3, 40)),
         ("wait 0.25", c.SET_WAIT_CMD, c.WAITCmd(250)),
         ("wait-input 3 level=off", c.SET_TRIG_CMD, c.TRIGCmd(3, c.TriggerMode.IO, c.TriggerIOCondition.EQUAL, 0)),
         ("suction off", c.SET_END_EFFECTOR_SUCTION_CUP, c.EndEffectorSuctionCup(False, False)),
@@ -326,11 +324,16 @@ async def test_a_program_is_executed_in_order(sim: Simulation, tmp_path: Path) -
         ("pwm 4 1000 50", c.SET_IOPWM, c.IOPWM(4, 1000, 50)),
         ("conveyor -5000 motor=1", c.SET_E_MOTOR, c.EMotor(1, True, -5000)),
         ("speed 20", c.SET_PTP_COMMON_PARAMS, c.PTPCommonParams(20, 20)),
+        ("rail on version=2", c.SET_DEVICE_WITH_L, c.DeviceWithL(True, c.AccessoryVersion.V2)),
+        ("tool pen", c.SET_END_EFFECTOR_PARAMS, Pen()),
+        ("tool x=80 z=-5", c.SET_END_EFFECTOR_PARAMS, c.EndEffectorParams(80, 0, -5)),
     ],
     ids=str,
 )
 def test_each_verb_is_the_command_of_the_queue(line: str, command: Command[Any, Any], value: Any) -> None:
-    assert parse([line]) == [Step(1, line, command, value)]
+    (step,) = VOCABULARIES["magician"].parse([line])
+    assert (step.number, step.text, step.verb) == (1, line, line.split(maxsplit=1)[0])
+    assert (step.command, step.value) == (command, value)
 
 
 async def test_a_program_longer_than_the_queue_runs_from_standard_input(sim: Simulation) -> None:
@@ -345,18 +348,26 @@ async def test_all_lines_are_checked_before_anything_is_sent(sim: Simulation) ->
     )
     done = await run("--url", sim.url, "run", "-", text=program)
     assert (done.code, done.output) == (2, "")
-    assert re.findall(r"line (\d+)", done.errors) == ["2", "3", "4", "5", "6", "7", "8"]
+    assert done.errors.count("\n") == 1
+    assert done.errors.startswith("error: standard input: line 2: no verb 'fly' for the Magician; there are: home, ")
+    assert done.errors.endswith("(wrong as well: lines 3, 4, 5, 6, 7, 8); nothing was sent\n")
     assert sim.arm.counters.requests == 0
 
 
 async def test_an_alarm_names_the_line_and_ends_the_program(sim: Simulation) -> None:
-    program = "move 200 0 50\nmove 900 0 0  # too far\n" + "move 200 0 50\n" * 50
+    program = "wait 0.1\nby 900 0 0  # too far\n" + "move 200 0 50\n" * 50
     done = await run("--url", sim.url, "run", "-", text=program)
     assert done.code == 1
     assert done.errors.count("\n") == 1
-    assert done.errors.startswith("error: line 2 (move 900 0 0): the arm raised alarms: 0x11")
+    assert done.errors.startswith("error: line 2 (by 900 0 0): the arm raised alarms: 0x11")
     assert sim.arm.device.idle
-    assert names(sim) == ["SetPTPCmd"]
+    assert names(sim) == ["SetWAITCmd"]
+
+
+async def test_an_alarm_behind_a_line_of_which_nobody_knows_names_both(sim: Simulation) -> None:
+    done = await run("--url", sim.url, "run", "-", text="home\nby 900 0 0\nmove 200 0 50\n")
+    assert done.code == 1
+    assert re.match(r"error: (line 1 \(home\) or )?line 2 \(by 900 0 0\): the arm raised alarms: 0x1", done.errors)
 
 
 # --- signals ---

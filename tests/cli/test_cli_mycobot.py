@@ -44,7 +44,8 @@ def test_motions_end_where_they_lead() -> None:
     assert [moved[axis] for axis in ("x", "y", "z")] == pytest.approx([float(each) for each in coords[:3]], abs=0.2)
     assert answer("myarm300", "move", "--mode", "joints", *joints, "-45")["joints"][6] == pytest.approx(-45, abs=0.02)
     assert answer("mypalletizer260", "home")["joints"] == [0.0] * 4
-    assert answer("mycobot", "jog", "j6-", "0.05")["joints"][5] < 0
+    jogged = CliRunner().invoke(cli, ["--json", "--arm", "mycobot", "--url", "sim:?speed=2", "jog", "j6-", "0.1"])
+    assert json.loads(jogged.output)["joints"][5] < 0
     assert answer("mycobot", "stop") == {"stopped": True}
     assert answer("mycobot", "alarms") == {"alarms": []}
     assert call("mycobot", "alarms", "--clear").output == "no alarms\n"
@@ -53,7 +54,7 @@ def test_motions_end_where_they_lead() -> None:
 @pytest.mark.parametrize(
     ("arm", "arguments", "why"),
     [
-        ("mycobot", ["move", "1", "2", "3"], "must have 6 values for this arm, not 3"),
+        ("mycobot", ["move", "--mode", "joints", "1", "2", "3"], "must have 6 values for this arm, not 3"),
         ("mycobot", ["move", "1", "2", "3", "4", "5", "6", "7"], "at most 6 numbers"),
         ("mycobot", ["move", "--mode", "jump", "1", "2", "3"], "one of to, linear, joints"),
         ("mycobot", ["move", "--mode", "joints", "170", "0", "0", "0", "0", "0"], "joint 1 must be in"),

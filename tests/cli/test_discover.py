@@ -17,9 +17,10 @@ import pytest
 from click.testing import CliRunner
 
 from dobot_async import DeviceInfo, Found
+from dobot_async.cli.arms.magician_frames import described
 from dobot_async.cli.discover import table
 from dobot_async.cli.main import cli
-from dobot_async.cli.trace import Trace
+from dobot_async.cli.trace import Trace, TraceFile
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import Frame
 from dobot_async.simulator import Simulation, announced, simulate
@@ -199,7 +200,7 @@ def test_nor_is_it_when_it_is_read_or_does_not_fit(tmp_path: Path) -> None:
     with (tmp_path / "trace").open("w") as file:
         for frame in (Frame(152, 0, b"hunter2\0"), Frame(152, 1, b"hunter2"), Frame(152, 3, b"hunter2" * 20)):
             for outgoing in (False, True):
-                Trace(file)(outgoing, frame)
+                Trace(TraceFile(file), described)(outgoing, frame)
 
     text = (tmp_path / "trace").read_text()
     assert text.count("***") == 3 * 6

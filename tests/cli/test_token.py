@@ -64,9 +64,9 @@ async def test_a_client_gets_in_with_it(listen: str, way: str, file: Path, monke
 def test_the_environment_gives_it_where_one_is_presented(
     url: str, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert with_token(url) == url
+    assert with_token(url, None) == url
     monkeypatch.setenv("DOBOT_TOKEN", TOKEN)
-    assert with_token(url) == expected
+    assert with_token(url, None) == expected
 
 
 @pytest.mark.parametrize("url", ["sim:", "serial:///dev/ttyUSB0", "tcp://h:1?token=x", "ws://h:1?token_file=x"])

@@ -90,6 +90,26 @@ ARM = '[arms.a]\nurl = "sim:"\n'
         (f"{ARM}[zones.z]\nbox = {{ x = ['a', 1] }}", r"zones\.z: box: x: expected a number, not 'a'"),
         (f"{ARM}[zones.z]\ncylinder = {{ x = 1, y = 1 }}", r"zones\.z: cylinder: radius: it is missing"),
         (f"{ARM}[zones.z]\ncylinder = {{}}\nbox = {{}}", r"zones\.z: either a box or a cylinder"),
+        (f"{ARM}base = {{ x = 1{'0' * 400} }}", r"arms\.a: base: x: the number is too large"),
+        (f"{ARM}clearance = 1{'0' * 400}", r"arms\.a: clearance: the number is too large"),
+        (f"{ARM}options = {{ window = 1{'0' * 400} }}", r"arms\.a: options: window: the number is too large"),
+        (f"{ARM}options = {{ a = {'[' * 3000}{']' * 3000} }}", "nested too deeply"),
+        (f"{ARM}options = {{ chek_reach = true }}", r"arms\.a: options: connect of a magician has no 'chek_reach'"),
+        (f"{ARM}options = {{ check_reach = 1 }}", r"arms\.a: options: check_reach: 1 is not what it takes"),
+        (f"{ARM}options = {{ timeout = '5' }}", r"arms\.a: options: timeout: '5' is not what it takes"),
+        (f"{ARM}options = {{ timeout = nan }}", r"arms\.a: options: timeout must be"),
+        (f"{ARM}options = {{ timeout = true }}", r"arms\.a: options: timeout: True is not what it takes"),
+        (f"{ARM}options = {{ timeout = [1, 2] }}", r"arms\.a: options: timeout: \[1, 2\] is not what it takes"),
+        (f"{ARM}options = {{ reply_timeout = [0.5] }}", r"arms\.a: options: reply_timeout: expected \[lowest"),
+        (f"{ARM}options = {{ queue = 'old' }}", r"arms\.a: options: queue must be 'fresh' or 'keep'"),
+        (f"{ARM}options = {{ url = 'sim:' }}", r"arms\.a: options: connect of a magician has no 'url'"),
+        (f"{ARM}model = 'myarm300'", r"arms\.a: options: connect of a magician has no 'model'"),
+        (f"{ARM}family = 'mycobot'\nmodel = 'x'", r"arms\.a: options: model: one of myarm300, .* not 'x'"),
+        (f"{ARM}family = 'ultraarm'\noptions = {{ limits = 1 }}", r"arms\.a: options: connect .* has no 'limits'"),
+        ('[arms.a]\nurl = "file:///etc/passwd"', r"arms\.a: url: 'file:///etc/passwd' has no scheme"),
+        ('[arms."a:b"]\nurl = "sim:"', r"arms\.'a:b': a name has"),
+        ('[arms."*"]\nurl = "sim:"', r"arms\.'\*': a name has"),
+        ('[arms."a\\u001bb"]\nurl = "sim:"', r"arms\.'a b': a name has"),
     ],
 )
 def test_wrong_files(text: str, why: str) -> None:
@@ -101,6 +121,21 @@ def test_the_message_begins_with_the_file(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text("[arms.a]", encoding="utf-8")
     with pytest.raises(ValueError, match=r"cell\.toml: arms\.a"):
+        read_cell(path)
+
+
+def test_options_are_what_connect_takes() -> None:
+    options = "options = { reply_timeout = [0.05, 1], window = 2, reconnect = true, on_error = 'leave' }"
+    (member,) = parse_cell(f"{ARM}{options}").members.values()
+    assert member.options == {"reply_timeout": (0.05, 1), "window": 2, "reconnect": True, "on_error": "leave"}
+
+
+def test_a_byte_order_mark_is_none_of_the_text(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(f"\ufeff{ARM}", encoding="utf-8")
+    assert list(read_cell(path).members) == ["a"]
+    path.write_bytes(b"\xff")
+    with pytest.raises(ValueError, match=r"cell\.toml: not UTF-8 text"):
         read_cell(path)
 
 

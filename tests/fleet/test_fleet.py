@@ -25,10 +25,10 @@ class Oops(Exception):
 
 
 @asynccontextmanager
-async def cell(*names: str, speed: float = 20, **details: object) -> AsyncIterator[dict[str, Simulation]]:
+async def cell(*names: str, speed: float = 20, **details: Any) -> AsyncIterator[dict[str, Simulation]]:
     """Simulated Magicians by name."""
     async with AsyncExitStack() as stack:
-        yield {name: await stack.enter_async_context(simulate(speed=speed, **details)) for name in names}  # type: ignore[arg-type]
+        yield {name: await stack.enter_async_context(simulate(speed=speed, **details)) for name in names}
 
 
 def urls(sims: dict[str, Simulation]) -> dict[str, str]:
@@ -479,7 +479,7 @@ async def test_families_side_by_side() -> None:
     async with (
         simulate(speed=20) as one,
         simulate("mycobot280", speed=20) as two,
-        simulate("ultraarm", speed=20) as three,
+        simulate("ultraarm", homed=True, speed=20) as three,
     ):
         members: dict[str, Member[Magician | MyCobot | UltraArm]] = {
             "magician": Member(one.url, Magician),

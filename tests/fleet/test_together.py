@@ -138,7 +138,7 @@ async def test_families_that_cannot_pause_start_with_the_others() -> None:
     async with (
         simulate(speed=5) as one,
         simulate("mycobot280", speed=5) as two,
-        simulate("ultraarm", speed=5) as three,
+        simulate("ultraarm", homed=True, speed=5) as three,
     ):
         members: dict[str, Member[Magician | MyCobot | UltraArm]] = {
             "magician": Member(one.url, Magician),

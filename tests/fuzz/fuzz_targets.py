@@ -12,11 +12,11 @@ from typing import Any
 from fuzz_mycobot import mycobot_arm, mycobot_parser
 from fuzz_ultraarm import ultraarm_answers, ultraarm_arm, ultraarm_gcode
 
-from dobot_async.cli.program import parse
 from dobot_async.errors import ProtocolError
 from dobot_async.magician import alarms
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import HEADER, MAX_LENGTH, OVERHEAD, Frame, Parser
+from dobot_async.program import VOCABULARIES
 from dobot_async.simulator import DeviceOptions, Quirks, SimulatedMagician
 from dobot_async.wire import Layout
 
@@ -179,13 +179,13 @@ def program(data: bytes) -> None:
     """A program file; what is not UTF-8 is replaced."""
     lines = data.decode("utf-8", "replace").split("\n")
     try:
-        steps = parse(lines)
+        steps = VOCABULARIES["magician"].parse(lines)
     except ValueError as error:
         messages = str(error).split("\n")
         assert all(message.startswith("line ") for message in messages), messages
         return
 
-    again = parse([step.text for step in steps])
+    again = VOCABULARIES["magician"].parse([step.text for step in steps])
     for step, same in zip(steps, again, strict=True):
         assert step.command is same.command
         assert step.command.request.encode(step.value) == same.command.request.encode(same.value)

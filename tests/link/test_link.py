@@ -234,7 +234,7 @@ async def test_however_many_are_lost_in_a_row_it_is_mended_behind_them(losses: i
 
 
 async def test_the_next_barrier_has_another_key_for_the_answer_to_the_last_one_may_be_lost() -> None:
-    """The answer to a second one of its key would pass for that to the first, and prove nothing of what is in between."""
+    """The answer to a second one of its key would pass for that to the first, and prove nothing of what is between."""
     async with line() as (link, wire):
         wire.fates = chain(repeat(None, 4), repeat(LATENCY))  # three questions, and the first barrier among them
         calls = [start(asked(link, c.GET_DEVICE_ID, timeout=30)), start(asked(link, timeout=30))]

@@ -27,6 +27,16 @@ def test_before_the_first_sample_the_timeout_is_the_initial_one() -> None:
     assert trip.timeout == INITIAL
 
 
+@given(st.floats(0.001, 5), st.floats(1, 10), st.lists(seconds, max_size=5))
+def test_it_is_never_below_the_floor_nor_above_the_ceiling(floor: float, factor: float, samples: list[float]) -> None:
+    trip = RoundTrip(floor, floor * factor)
+    assert floor <= trip.timeout <= floor * factor
+    for sample in samples:
+        trip.sample(sample)
+        trip.unanswered()
+        assert floor <= trip.timeout <= floor * factor
+
+
 def test_the_first_sample_counts_three_times() -> None:
     trip = measured(0.04)
     assert trip.smoothed == 0.04

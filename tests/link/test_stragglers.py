@@ -55,6 +55,19 @@ def test_where_losses_are_frequent_nobody_is_suspected(stragglers: Stragglers) -
     assert stragglers.suspected("pose", 10.0)
 
 
+def test_a_loss_whose_reply_comes_after_all_was_none(stragglers: Stragglers) -> None:
+    for second in range(10):
+        stragglers.lost("pose", 10.0 + second)
+        stragglers.came("pose", 10.5 + second)
+
+    assert stragglers.suspected("pose", 19.9)
+    stragglers.came("alarms", 19.9)
+    for _ in range(RARE):
+        stragglers.lost("pose", 20.0)
+
+    assert not stragglers.suspected("pose", 20.0)
+
+
 def test_what_had_several_replies_is_suspected_and_no_loss_of_the_line(stragglers: Stragglers) -> None:
     for second in range(10):
         stragglers.lost("pose", 10.0 + second, counts=False)

@@ -520,6 +520,8 @@ async def test_inputs_outputs_and_sensors() -> None:
         await arm.set_output(4, level=True)
         assert await arm.get_output(4)
         assert sim.arm.output(4)
+        await arm.configure_io(5, c.IOFunction.DI)
+        await arm.configure_io(6, c.IOFunction.ADC)
         sim.arm.set_input(5, True)
         assert await arm.get_input(5)
         sim.arm.set_adc(6, 1234)

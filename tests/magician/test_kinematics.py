@@ -79,7 +79,7 @@ def test_every_place_is_either_reached_or_explained(
         ((0, 0, 100, 0), 0x10, "axis of joint 1"),
         ((-200, 0, 0, 180), 0x12, r"joint 1 would be 180\.0 degrees, limit 125$"),
         ((150, 0, 150, 0), 0x12, r"joint 2 would be -23\.7 degrees, limit -5$"),
-        ((150, 0, -50, 0), 0x12, r"joint 3 would be 91\.4 degrees, limit 85$"),
+        ((150, 0, -50, 0), 0x12, r"joint 3 would be 91\.4 degrees, limit 90$"),
         ((200, 0, 0, 200), 0x12, r"joint 4 would be 200\.0 degrees, limit 150$"),
         (
             (300, 150, -50, 0),

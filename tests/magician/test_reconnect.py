@@ -6,6 +6,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
+from typing import Any, cast
 
 import pytest
 from virtual import virtual
@@ -200,7 +201,7 @@ async def test_an_arm_that_is_paused_was_not_switched_off() -> None:
 async def test_old_firmware_without_a_clock_is_driven_all_the_same(caplog: pytest.LogCaptureFixture) -> None:
     async with simulate() as sim, Magician.connect(sim.url) as arm:
         answer = sim.arm.answer
-        sim.arm.answer = lambda frame: b"" if frame.id == c.GET_DEVICE_TIME.id else answer(frame)
+        cast(Any, sim.arm).answer = lambda frame: b"" if frame.id == c.GET_DEVICE_TIME.id else answer(frame)
         await arm.move_to(220, 0, 40)
         await asyncio.sleep(5)
         await arm.move_to(200, 0, 40)

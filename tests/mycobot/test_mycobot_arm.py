@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from virtual import virtual
 
+from dobot_async.arms.info import DeviceInfo
 from dobot_async.errors import (
     ArmAlarm,
     CommandRejected,
@@ -182,7 +183,8 @@ async def test_pause_waits_in_the_middle_of_a_motion_and_resume_goes_on() -> Non
 @virtual
 async def test_stopping_a_paused_arm_makes_it_ready_again() -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
-        sim.arm._end_all = lambda: (sim.arm.device.force_stop(), sim.arm.device.clear(), sim.arm.device.start())
+        simulated: Any = sim.arm
+        simulated._end_all = lambda: (simulated.device.force_stop(), simulated.device.clear(), simulated.device.start())
         motion = await arm.queue.move_joint(1, 150)
         await asyncio.sleep(0.5)
         await arm.pause()
@@ -374,11 +376,9 @@ async def test_what_a_model_cannot_do_is_refused_before_it_is_queued() -> None:
             with pytest.raises(ValueError, match=r"myPalletizer 260|must be in"):
                 await arm.queue.put(command, value)
 
-        with pytest.raises(ValueError, match="the axes 1 to 4"):
-            await arm.jog("ry+", 1)
-
-        with pytest.raises(ValueError, match="joints 1 to 4"):
-            await arm.jog("j5+", 1)
+        for direction in ("ry+", "j5+"):
+            with pytest.raises(ValueError, match=r"is j1\+ j1- .* j4\+ j4- x\+ x- .* rx\+ rx-, not"):
+                await arm.jog(direction, 1)
 
         await arm.queue.put(c.SEND_ANGLE, c.JointMove(1, 10))
         await arm.queue.join()
@@ -430,7 +430,7 @@ async def test_jogs_last_as_long_as_they_are_told_to() -> None:
 
         assert not sim.arm.moving
         for wrong in ("j7+", "j1", "q+", ""):
-            with pytest.raises(ValueError, match=r"direction|joints 1 to 6"):
+            with pytest.raises(ValueError, match="direction"):
                 await arm.jog(wrong, 1)
 
         with pytest.raises(ValueError, match="seconds"):
@@ -457,7 +457,7 @@ async def test_the_other_motions() -> None:
         await arm.move_elbow(5)
         after = await arm.get_coords()
         assert near((after.x, after.y, after.z), (before.x, before.y, before.z), 1)
-        assert abs(sim.arm.joints[2] - 5) < 0.1
+        assert abs(await arm.request(c.GET_SOLUTION_ANGLES, None) - 5) < 0.1
 
 
 @pytest.mark.parametrize("quirks", [MyCobotQuirks(), OLD], ids=["new firmware", "old firmware"])
@@ -491,7 +491,6 @@ async def test_what_is_set_takes_effect_before_the_call_returns(quirks: MyCobotQ
         await arm.request(c.SET_TRANSPONDER_MODE, c.TransponderMode.CHECK_ALL)
         assert await arm.request(c.GET_TRANSPONDER_MODE, None) is c.TransponderMode.CHECK_ALL
         await arm.gripper_to(40, speed=100)
-        await asyncio.sleep(1)
         assert await arm.get_gripper() == 40
         assert await arm.get_voltages() == (7.2,) * 6
         assert await arm.get_temperatures() == (30,) * 6
@@ -510,8 +509,9 @@ async def test_a_gripper_in_the_queue_is_done_when_it_rests() -> None:
 @virtual
 async def test_old_firmware_tells_what_it_can() -> None:
     async with simulate("mycobot280", quirks=OLD) as sim, MyCobot.connect(sim.url) as arm:
-        info = await arm.get_info()
+        info = await arm.get_versions()
         assert (info.model, info.system_version, info.basic_version) == ("myCobot 280", None, None)
+        assert await arm.get_info() == DeviceInfo("", "", "")
         assert await arm.get_alarms() == ()
         unknown = sim.arm.counters.unknown
         for _ in range(3):
@@ -572,7 +572,6 @@ async def test_wrong_arguments_are_refused_before_a_byte_is_sent() -> None:
             (arm.move_joints(0, 0, 0), "6 values for this arm, not 3"),
             (arm.move_joints(170, 0, 0, 0, 0, 0), "joint 1 must be in -168 to 168"),
             (arm.move_to(0, 0, 1000, 0, 0, 0), "z must be in"),
-            (arm.move_to(0, 0, 100), "6 values for this arm"),
             (arm.move_elbow(10), "has no SetSolutionAngles"),
             (arm.request(c.SEND_ANGLES, c.JointsMove((0,) * 6)), "goes through the queue"),
             (arm.queue.wait(float("nan")), "seconds"),
@@ -656,7 +655,8 @@ async def test_a_reopened_line_finds_its_motion_again() -> None:
 @virtual
 async def test_an_arm_that_does_not_stop_is_not_said_to_have_stopped() -> None:
     async with simulate("mycobot280") as sim, MyCobot.connect(sim.url) as arm:
-        sim.arm.halt = lambda: None
+        simulated: Any = sim.arm
+        simulated.halt = lambda: None
         motion = await arm.queue.move_joint(1, 160, speed=1)
         await asyncio.sleep(1)
         with pytest.raises(MotionUnknown, match="still moves"):

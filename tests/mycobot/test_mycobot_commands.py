@@ -105,7 +105,7 @@ def test_a_model_lacks_what_it_does_not_have() -> None:
     with pytest.raises(ValueError, match="a myCobot 280 has no SetSolutionAngles"):
         MODELS["mycobot280"].row(c.SET_SOLUTION_ANGLES)
 
-    with pytest.raises(ValueError, match="there are: myarm300, mycobot280"):
+    with pytest.raises(ValueError, match="there are: mycobot, myarm300, mycobot280"):
         model_of("mycobot380")
 
 

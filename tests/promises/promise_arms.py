@@ -88,7 +88,7 @@ async def simulated(
 ) -> AsyncIterator[tuple[Simulation, Lines]]:
     """A simulated arm, and the lines over which it will be reached; takes what `bench` takes."""
     with promise_lines(manner or latencies, seed=seed) as lines:
-        async with simulate(family.model, speed=speed, **(details or {})) as sim:
+        async with simulate(family.model, speed=speed, **{**family.details, **(details or {})}) as sim:
             try:
                 yield sim, lines
             finally:

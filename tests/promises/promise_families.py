@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AbstractAsyncContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from dobot_async import Jog, Magician, MyCobot, UltraArm, UltraArmJog
@@ -29,6 +29,7 @@ class Family:
         jog: A direction with a long way to go.
         read: Asks it something.
         slow: The simulator's speed at which the way from near to far takes minutes.
+        details: What `simulate` needs, so that the arm can move.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Family:
     jog: Any
     read: Callable[[Any], Awaitable[Any]]
     slow: float
+    details: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def connect(self, url: str, **options: Any) -> AbstractAsyncContextManager[Any]:
         """Its `connect`."""
@@ -80,6 +82,7 @@ FAMILIES = (
         jog=UltraArmJog.J1_PLUS,
         read=lambda arm: arm.get_angles(),
         slow=0.02,
+        details={"homed": True},
     ),
 )
 BY_NAME = {family.name: family for family in FAMILIES}

@@ -46,6 +46,10 @@ INTERNAL = frozenset(
         "write_on",
         "writer_ended",
         "perform",
+        "perform_from_goal",
+        "goal",
+        "find_goal",
+        "planned",
         "prepare",
         "put_all",
         "stopping",
@@ -163,16 +167,14 @@ async def run_on(arm: Any, _: Any) -> None:
 def shared(family: Family) -> list[Verb]:
     """What all families have."""
     far = family.far
-    hosted = family.name == "mycobot"
-    alone = family.name == "ultraarm"  # it can neither pause nor forget what is queued
+    hosted = family.name != "magician"  # its queue is on this side
 
     async def prepared(arm: Any) -> Any:
         return await queued(arm, far)
 
     async def paused(arm: Any) -> Any:
         await queued(arm, far)
-        if not alone:
-            await arm.queue.pause()
+        await arm.queue.pause()
 
     def core(name: str, call: Call, moments: Mapping[str, float] = SHORT, **details: Any) -> Verb:
         return Verb(name, call, moments, core=True, **details)
@@ -194,13 +196,13 @@ def shared(family: Family) -> list[Verb]:
         Verb("queue.join", lambda arm, _: arm.queue.join(timeout=60), LONG, prepare=prepared, what="with a timeout"),
         Verb("queue.join", run_on, LONG, prepare=prepared, what="twice at a time"),
         core("queue.stop", lambda arm, _: arm.queue.stop(), prepare=prepared),
-        Verb("queue.clear", lambda arm, _: arm.queue.clear(), SHORT, prepare=prepared, at_once=hosted or alone),
-        Verb("queue.pause", lambda arm, _: arm.queue.pause(), SHORT, prepare=prepared, refused=alone),
+        Verb("queue.clear", lambda arm, _: arm.queue.clear(), SHORT, prepare=prepared, at_once=hosted),
+        Verb("queue.pause", lambda arm, _: arm.queue.pause(), SHORT, prepare=prepared),
         Verb("queue.batch", lambda arm, _: batch(arm, far), SHORT, at_once=hosted, core=True, what="leaving"),
         Verb("motion.wait", lambda _, motion: motion.wait(), LONG, prepare=prepared, core=True),
         Verb("motion.wait", lambda _, motion: motion.wait(60), LONG, prepare=prepared, what="with a timeout"),
         Verb("motion.__await__", lambda _, motion: waited(motion), LONG, prepare=prepared, core=True),
-        Verb("queue.resume", lambda arm, _: arm.queue.resume(), SHORT, prepare=paused, refused=alone),
+        Verb("queue.resume", lambda arm, _: arm.queue.resume(), SHORT, prepare=paused),
     ]
 
 
@@ -219,6 +221,9 @@ def magician() -> list[Verb]:
     async def alarmed(arm: Any) -> None:
         await arm.queue.move_to(*far)
 
+    async def half_open(place: Any) -> None:
+        await place.gripper_to(50)
+
     return [
         *(read(name) for name in ("get_pose", "get_info", "get_alarms", "get_joints")),
         read("get_rail", prepare=lambda arm: arm.set_rail()),
@@ -227,6 +232,8 @@ def magician() -> list[Verb]:
         read("get_adc", 5, prepare=pin(m.IOFunction.ADC)),
         read("get_color", prepare=lambda arm: arm.set_color_sensor(m.ColorPort.GP1)),
         read("get_infrared", m.InfraredPort.GP1, prepare=lambda arm: arm.set_infrared_sensor(m.InfraredPort.GP1)),
+        read("wait_for_color", prepare=lambda arm: arm.set_color_sensor(m.ColorPort.GP1)),
+        read("wait_for_infrared", m.InfraredPort.GP1, prepare=lambda arm: arm.set_infrared_sensor(m.InfraredPort.GP1)),
         read("set_color_sensor", m.ColorPort.GP1),
         read("set_infrared_sensor", m.InfraredPort.GP1),
         read("set_rail"),
@@ -251,6 +258,10 @@ def magician() -> list[Verb]:
         *two("set_output", 5, True, long=False, prepare=pin(m.IOFunction.DO)),
         *two("set_pwm", 5, 100, 50, long=False, prepare=pin(m.IOFunction.PWM)),
         *two("conveyor", 1000, long=False),
+        *two("conveyor_mm", 10, pulses_per_mm=160, long=False),
+        *two("set_home", 200, 0, 50, long=False),
+        Verb("gripper_to", lambda arm, _: half_open(arm), refused=True),
+        Verb("queue.gripper_to", lambda arm, _: half_open(arm.queue), refused=True),
         *two("set_speed", 50, long=False),
         Verb("queue.put", lambda arm, _: arm.queue.put(m.SET_PTP_CMD, m.PTPCmd(m.PTPMode.MOVJ_XYZ, *far, 0))),
         Verb("queue.download", lambda arm, _: download(arm), LONG, core=True, what="leaving"),
@@ -279,6 +290,7 @@ def mycobot() -> list[Verb]:
                 "get_coords",
                 "get_pose",
                 "get_info",
+                "get_versions",
                 "get_alarms",
                 "is_moving",
                 "is_paused",
@@ -321,7 +333,8 @@ def mycobot() -> list[Verb]:
         *both("move_encoders", 3000, 2048, 2048, 2048, 2048, 2048),
         *both("gripper", True, long=False),
         *both("gripper_to", 50, long=False),
-        *both("suction", True, long=False),
+        Verb("suction", lambda arm, _: arm.suction(True), refused=True, at_once=True),
+        Verb("queue.suction", lambda arm, _: arm.queue.suction(True), refused=True, at_once=True),
         *both("color", 1, 2, 3, long=False),
         *both("configure_pin", 5, y.PinMode.OUTPUT, long=False),
         *both("set_pin", 5, True, long=False, prepare=lambda arm: arm.configure_pin(5, y.PinMode.OUTPUT)),
@@ -337,6 +350,9 @@ def mycobot() -> list[Verb]:
 
 def ultraarm() -> list[Verb]:
     """What an ultraArm has."""
+
+    def both(name: str, *args: Any, **details: Any) -> list[Verb]:
+        return two(name, *args, hosted=True, **details)
 
     async def moving(arm: Any) -> None:
         await arm.queue.move_joints(160, 10, 10)
@@ -360,27 +376,27 @@ def ultraarm() -> list[Verb]:
         ),
         Verb("clear_alarms", lambda arm, _: arm.clear_alarms(), SHORT, moving, core=True),
         Verb("recover", lambda arm, _: arm.recover(), SHORT, moving, core=True),
-        Verb("pause", lambda arm, _: arm.pause(), SHORT, moving, refused=True),
-        Verb("resume", lambda arm, _: arm.resume(), refused=True),
+        Verb("pause", lambda arm, _: arm.pause(), SHORT, moving),
+        Verb("resume", lambda arm, _: arm.resume()),
         Verb("jog_stop", lambda arm, _: arm.jog_stop(), SHORT, moving),
         Verb("run_gcode", lambda arm, _: gcode(arm), LONG, core=True),
         Verb("run_gcode", lambda arm, _: gcode_lines(arm), LONG, what="line by line"),
-        *two("move_to", 200, 50, 0, speed=5),
-        *two("move_by", 0, 10, 0, speed=5),
-        *two("move_joint", 1, 160),
-        *two("set_position", 100, 0, 0, long=False),
-        *two("absolute", long=False),
-        *two("relative", long=False),
-        *two("set_speed_mode", u.SpeedMode.RAMPED, long=False),
-        *two("suction", True, long=False),
-        *two("gripper", 1, long=False),
-        *two("gripper_to", 50, long=False),
-        *two("release_gripper", long=False),
-        *two("laser", False, long=False),
-        *two("pwm", 0, long=False),
-        *two("fan", True, long=False),
-        *two("power_on", long=False),
-        Verb("queue.put", lambda arm, _: arm.queue.put(u.MOVE_JOINT, u.JointMove(1, 160, 50))),
+        *both("move_to", 200, 50, 0, speed=5),
+        *both("move_by", 0, 10, 0, speed=5),
+        *both("move_joint", 1, 160),
+        *both("set_position", 100, 0, 0, long=False),
+        *both("absolute", long=False),
+        *both("relative", long=False),
+        *both("set_speed_mode", u.SpeedMode.RAMPED, long=False),
+        *both("suction", True, long=False),
+        *both("gripper", True, long=False),
+        *both("gripper_to", 50, long=False),
+        *both("release_gripper", long=False),
+        *both("laser", False, long=False),
+        *both("pwm", 0, long=False),
+        *both("fan", True, long=False),
+        *both("power_on", long=False),
+        Verb("queue.put", lambda arm, _: arm.queue.put(u.MOVE_JOINT, u.JointMove(1, 160, 50)), BEFORE, at_once=True),
     ]
 
 

@@ -29,7 +29,7 @@ OF_ALL: dict[str, tuple[Any, ...]] = {
 OWN: dict[str, dict[str, tuple[Any, ...]]] = {
     "magician": {"window": (0, -1, nan)},
     "mycobot": {"gap": (nan, inf, -1), "tolerance": ((nan, 1), (1, nan), (0, 1), (-1, 1), (inf, 1), (1, inf))},
-    "ultraarm": {"depth": (0, -1, nan), "tolerance": (nan, inf, -1, 0)},
+    "ultraarm": {"tolerance": (nan, inf, -1, 0)},
 }
 OPTIONS = [
     (family.name, name, value)
@@ -41,7 +41,7 @@ OPTIONS = [
 
 def refusals(family: str, argument: str) -> tuple[type[Exception], ...]:
     """What a wrong number raises: where whole numbers are wanted, one that is none may be a TypeError."""
-    whole = {"window", "depth"} | ({"speed"} if family == "mycobot" else set())
+    whole = {"window"} | ({"speed"} if family == "mycobot" else set())
     return (ValueError, TypeError) if argument in whole else (ValueError,)
 
 

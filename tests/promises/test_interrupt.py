@@ -46,7 +46,7 @@ async def interrupted(family: Family, call: str) -> Program:
     """Runs a program, takes its line away, interrupts it."""
     path = os.pathsep.join([str(Path(dobot_async.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
     async with (
-        simulate(family.model, speed=SLOW, listen="tcp://127.0.0.1:0") as sim,
+        simulate(family.model, speed=SLOW, listen="tcp://127.0.0.1:0", **family.details) as sim,
         relay_to(urlsplit(sim.url).port or 0) as relay,
     ):
         process = await asyncio.create_subprocess_exec(

@@ -27,11 +27,11 @@ OUT_OF_REACH = (600, 0, 0)
 
 async def alarmed(b: Bench) -> list[Any]:
     """Three motions, the first out of reach, so that the arm raises alarms."""
-    return [
-        await b.arm.queue.move_to(*OUT_OF_REACH),
-        await b.arm.queue.move_to(220, 0, 40),
-        await b.arm.queue.move_to(200, 0, 40),
-    ]
+    await b.arm.queue.pause()
+    places = (OUT_OF_REACH, (220, 0, 40), (200, 0, 40))
+    motions = [await b.arm.queue.move_to(*place) for place in places]
+    await b.arm.queue.resume()
+    return motions
 
 
 # C5: hooks are isolated.

@@ -19,7 +19,15 @@ from typing import TYPE_CHECKING, Any, Literal
 from calls import Call, Violation
 from observed import Observed
 
-from dobot_async import ArmAlarm, ConnectionLost, DobotError, MotionStopped, MotionUnknown, ReplyTimeout
+from dobot_async import (
+    ArmAlarm,
+    CommandRejected,
+    ConnectionLost,
+    DobotError,
+    MotionStopped,
+    MotionUnknown,
+    ReplyTimeout,
+)
 from dobot_async._core.queue.motion import Motion
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation
@@ -30,7 +38,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Fate", "Jogging", "Kind", "Record", "Standstill", "check_jogs", "judge", "judge_answer", "judge_set"]
 
-Kind = Literal["move", "step", "far", "wait", "pwm"]
+Kind = Literal["move", "step", "far", "wait", "setting"]
 Found = list[tuple[int, Executed]]
 NAME = re.compile(r"sim://arm[0-9]+")
 TINY = 1e-6
@@ -202,8 +210,9 @@ def check_failure(
 
     if isinstance(error, MotionUnknown):
         excused = seen.silent(begun - LINGERING, ended, UNHEARD) or (plan.doubles and "step" in plan.kinds)
-        # Nothing can tell a command from a probe, where both are lost and the arm has no index yet.
-        excused = excused or (plan.loses and seen.has_no_index(begun - LINGERING, ended))
+        # Nothing can tell a command from a probe, where both are lost and the arm has no index yet. A datagram that
+        # stands still for longer than others may overtake it is lost, too.
+        excused = excused or ((plan.loses or plan.datagrams) and seen.has_no_index(begun - LINGERING, ended))
         ensure(excused, f"unknown without a silence: {error!r}: {what}")
     elif isinstance(error, ReplyTimeout):
         lost = plan.loses and ended - begun >= BRIEF
@@ -213,6 +222,8 @@ def check_failure(
         ensure(excused, f"no answer on a line that carries them: {error!r}: {what}")
     elif isinstance(error, ArmAlarm):
         ensure("far" in plan.kinds, f"no alarm was there: {error!r}: {what}")
+    elif isinstance(error, CommandRejected):
+        ensure(what.startswith("jog"), f"refused, though it is no jog beside motions: {error!r}: {what}")
     elif not isinstance(error, MotionStopped):
         raise Violation(f"failed with what is none of its failures: {error!r}: {what}")
 

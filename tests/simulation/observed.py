@@ -154,6 +154,8 @@ class Observed:
         if row in {c.GET_IODI, c.GET_IOADC} and len(frame.params) == 1 and frame.params[0] in PINS:
             address = frame.params[0]
             times = len(self.answers[row.id, address])
+            function = c.IOFunction.DI if row is c.GET_IODI else c.IOFunction.ADC
+            arm.state.set(c.SET_IO_MULTIPLEXING, c.IOMultiplexing(address, function))
             if row is c.GET_IODI:
                 arm.set_input(address, LEVELS[times % len(LEVELS)])
             else:

@@ -43,7 +43,7 @@ COMMANDS: dict[Kind, Callable[[int], tuple[Any, Any]]] = {
     "step": lambda number: (c.SET_PTP_CMD, c.PTPCmd(PTPMode.MOVJ_XYZ_INC, 0, 0, (number + 1) / 1024)),
     "far": lambda number: (c.SET_PTP_CMD, c.PTPCmd(PTPMode.MOVJ_XYZ, 500 + number, 0, 0)),
     "wait": lambda number: (c.SET_WAIT_CMD, c.WAITCmd(500 + number)),
-    "pwm": lambda number: (c.SET_IOPWM, c.IOPWM(1, 1000 + number, 50)),
+    "setting": lambda number: (c.SET_PTPL_PARAMS, c.PTPLParams(1000 + number, 50)),
 }
 """What the command of a number is: absolute, relative, out of reach, one that takes time, one that takes none."""
 
@@ -97,7 +97,7 @@ class Plan:
     def of(cls, random: Random) -> Plan:
         severity: Any = random.choices(["none", "standing", "mild", "harsh"], [25, 25, 20, 30])[0]
         datagrams = random.random() < 0.4
-        kinds: list[Kind] = ["move", "move", "move", "step", "wait", "pwm", "pwm"]
+        kinds: list[Kind] = ["move", "move", "move", "step", "wait", "setting", "setting"]
         if random.random() < 0.4:
             kinds.remove("step")
 
@@ -233,7 +233,7 @@ class Run:
 
     async def own_move(self, seconds: float) -> None:
         """A move that belongs to its call."""
-        fate = self.fate(self.random.choice([kind for kind in self.plan.kinds if kind != "pwm"]), watched=False)
+        fate = self.fate(self.random.choice([kind for kind in self.plan.kinds if kind != "setting"]), watched=False)
         self.spawn(self._own(fate, *draw_how(self.random)))
         await asyncio.sleep(seconds)
 

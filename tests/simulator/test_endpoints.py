@@ -16,6 +16,7 @@ from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from random import Random
 from typing import Any
+from urllib.parse import urlsplit
 
 import anyio
 import pytest
@@ -23,7 +24,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from virtual import run_virtual, virtual
 
-from dobot_async import ConnectFailed, Magician
+from dobot_async import ConnectFailed, IOFunction, Magician
 from dobot_async.simulator import Faults, Simulation, endpoints, simulate
 from dobot_async.simulator.faults import Channel
 from dobot_async.transports import Transport, open_transport
@@ -946,6 +947,18 @@ def test_the_seed_of_sim_reaches_the_line() -> None:
     assert answers(f"{url}1", count=50) != answers(f"{url}2", count=50)
 
 
+@pytest.mark.parametrize(("url", "homed"), [("sim:", True), ("sim:?homed=true", True), ("sim:?homed=false", False)])
+@virtual
+async def test_sim_is_homed_unless_it_is_told_otherwise(url: str, homed: bool) -> None:
+    transport: Any = await endpoints.open_url(urlsplit(url), arm="magician")
+    assert transport._simulation.arm.homed is homed
+    await transport.aclose()
+    with pytest.raises(ValueError, match="expected true or false"):
+        await endpoints.open_url(urlsplit("sim:?homed=maybe"), arm="magician")
+    async with simulate() as sim:
+        assert not sim.arm.homed
+
+
 @virtual
 async def test_the_speed_of_sim_is_the_arms() -> None:
     loop = asyncio.get_running_loop()
@@ -958,6 +971,7 @@ async def test_the_speed_of_sim_is_the_arms() -> None:
 @virtual
 async def test_each_sim_is_an_arm_of_its_own() -> None:
     async with Magician.connect("sim:") as one, Magician.connect("sim:") as other:
+        await one.configure_io(1, IOFunction.DO)
         await one.set_output(1, level=True)
         assert await one.get_output(1)
         assert not await other.get_output(1)

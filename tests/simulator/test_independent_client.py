@@ -8,6 +8,7 @@ sides are looked at: what the client was told, and what happened at the arm.
 from __future__ import annotations
 
 import asyncio
+import math
 import struct
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
@@ -110,6 +111,16 @@ async def until(condition: Callable[[], bool]) -> None:
             await asyncio.sleep(0.002)
 
 
+async def eventually(lab: Lab, value: Any, name: str, *args: Any) -> bool:
+    """Asks until a value comes back."""
+    async with asyncio.timeout(IN_TIME):
+        while True:
+            if await lab(name, *args) == value:
+                return True
+
+            await asyncio.sleep(0.002)
+
+
 async def refused(lab: Lab, kind: type[Exception], name: str, *args: Any) -> Any:
     """Calls a method that must raise; returns the error."""
     with pytest.raises(kind) as caught:
@@ -161,6 +172,8 @@ async def test_pose() -> None:
         pose = await lab("get_pose")
         assert pose.as_xyzr() == pytest.approx(HOME, abs=1e-3)
         assert pose.as_joints() == pytest.approx((0, 45, 45, 0), abs=1e-4)
+        assert math.isnan(await lab("get_posel")), "there is no rail"
+        await lab("write_command", CommandID.GET_SET_DEVICE_WITH_L, b"\1\0")
         assert await lab("get_posel") == 0
         still = unpack_floats((await lab("read_command", CommandID.GET_KINEMATICS)).params)
         assert still == (0, 0)
@@ -357,7 +370,7 @@ async def test_suction_gripper_and_laser() -> None:
 async def on_and_off(lab: Lab, name: str, seen: Callable[[], bool]) -> None:
     for enable, on in ((True, True), (True, False), (True, True), (False, False)):
         assert await lab(name, enable, on) is True
-        assert seen() is on
+        await until(lambda on=on: seen() is on)  # type: ignore[misc]
 
 
 async def test_inputs_and_outputs() -> None:
@@ -365,6 +378,9 @@ async def test_inputs_and_outputs() -> None:
         for function in (IOFunction.DO, IOFunction.PWM, IOFunction.DI, IOFunction.ADC, IOFunction.DIPU):
             await lab("set_multiplexing", "DO_04", function)
             assert lab.arm.state.get(c.SET_IO_MULTIPLEXING, 4) == c.IOMultiplexing(4, c.IOFunction(function))
+
+        for address, function in ((5, IOFunction.DO), (6, IOFunction.PWM), (7, IOFunction.DI), (8, IOFunction.ADC)):
+            await lab("set_multiplexing", address, function)
 
         for level in (1, 0):
             await lab("set_do", "DO_05", level)
@@ -384,6 +400,7 @@ async def test_inputs_and_outputs() -> None:
 
 async def test_waiting_for_an_input() -> None:
     async with ready() as lab:
+        await lab("set_multiplexing", 9, IOFunction.DI)
         trigger = struct.pack("<BBBH", 9, 0, 0, 1)  # input 9, digital, equal, high
         index = await lab("queue_command", CommandID.SET_TRIG_CMD, trigger)
         await lab("queue_command", CommandID.SET_PTP_CMD, pack_u8(PTPMode.MOVJ_XYZ) + pack_floats(*START))
@@ -395,15 +412,15 @@ async def test_waiting_for_an_input() -> None:
 
 async def test_sensors() -> None:
     async with ready() as lab:
-        lab.arm.color = c.Color(10, 20, 30)
+        lab.arm.color, lab.arm.color_version = c.Color(10, 20, 30), c.AccessoryVersion.V2
         assert await lab("get_color_sensor") == (0, 0, 0)
         await lab("set_color_sensor", 2, True, 1)
         assert lab.arm.state.get(c.SET_COLOR_SENSOR) == c.ColorSensor(True, c.ColorPort.GP4, c.AccessoryVersion.V2)
-        assert await lab("get_color_sensor") == (10, 20, 30)
-        lab.arm.infrared[c.InfraredPort.GP2] = True
+        assert await eventually(lab, (10, 20, 30), "get_color_sensor")
+        lab.arm.infrared[c.InfraredPort.GP2], lab.arm.infrared_version = True, c.AccessoryVersion.V2
         assert await lab("get_infrared_sensor", 1) == 0
         await lab("set_infrared_sensor", 1, True)
-        assert await lab("get_infrared_sensor", 1) == 1
+        assert await eventually(lab, 1, "get_infrared_sensor", 1)
         assert await lab("get_infrared_sensor", 0) == 0
 
 
@@ -546,6 +563,7 @@ async def test_an_alarmed_arm_holds_motions_back_and_nothing_else() -> None:
     """The client's help says that homing works during an alarm; no motion does before the alarm is cleared."""
     async with ready() as lab:
         await lab("move_to", *START)
+        await lab("set_multiplexing", 3, IOFunction.DO)
         lab.arm.raise_alarm(pydobotlab.Alarm.MOVE_INVERSE_LIMIT)
         index = await lab("queue_command", CommandID.GET_SET_IO_DO, pack_u8(3, 1))
         await lab("wait_for", index, timeout=5, raise_on_alarm=False)
@@ -668,6 +686,7 @@ async def test_a_stream_of_poses_during_a_motion() -> None:
 async def test_outputs_switch_on_the_way() -> None:
     async with ready() as lab:
         await lab("move_to", 200, -100, 40)
+        await lab("set_multiplexing", 1, IOFunction.DO)
         outputs = b"".join(struct.pack("<BHB", ratio, 1, level) for ratio, level in ((20, 1), (80, 0)))
         target = pack_u8(PTPMode.MOVL_XYZ) + pack_floats(200, 100, 40, 0)
         await lab("queue_command", CommandID.SET_PTP_PO_CMD, target + pack_u8(2) + outputs)

@@ -63,6 +63,10 @@ class Bench:
     def move(self, mode: c.PTPMode, *numbers: float) -> int:
         return self.put(c.SET_PTP_CMD, c.PTPCmd(mode, *numbers))
 
+    def configure(self, function: c.IOFunction, *addresses: int) -> None:
+        for address in addresses:
+            self.arm.state.set(c.SET_IO_MULTIPLEXING, c.IOMultiplexing(address, function))
+
     def jog(self, key: c.JOGKey, *, joint: bool = False) -> None:
         self.ask(c.SET_JOG_CMD, c.JOGCmd(joint, key))
 
@@ -269,19 +273,48 @@ def test_everything_can_be_read(row: Row, data: st.DataObject) -> None:
 
 def test_pins_are_apart() -> None:
     bench = Bench()
+    bench.configure(c.IOFunction.DO, *range(1, 21))
     for address in range(1, 21):
         bench.ask(c.SET_IODO, c.IODO(address, address % 2))
 
     assert [bench.ask(c.GET_IODO, address).level for address in range(1, 21)] == [1, 0] * 10
     assert [bench.arm.output(address) for address in range(1, 21)] == [1, 0] * 10
+    bench.configure(c.IOFunction.PWM, 4)
     bench.ask(c.SET_IOPWM, c.IOPWM(4, 1000, 25))
+    assert bench.arm.output(4) == 0
     assert (bench.arm.pwm(4), bench.arm.pwm(5).duty_cycle) == (c.IOPWM(4, 1000, 25), 0)
     with pytest.raises(ValueError, match="1 to 20"):
         bench.arm.output(21)
 
 
+@pytest.mark.parametrize("function", c.IOFunction)
+def test_a_pin_does_only_what_it_is_configured_for(function: c.IOFunction) -> None:
+    bench = Bench()
+    bench.ask(c.SET_IO_MULTIPLEXING, c.IOMultiplexing(2, function))
+    bench.ask(c.SET_IODO, c.IODO(2, 1))
+    bench.ask(c.SET_IOPWM, c.IOPWM(2, 50, 7.5))
+    bench.arm.set_input(2, 1)
+    bench.arm.set_adc(2, 1234)
+    put_out = bench.arm.output(2), bench.arm.pwm(2).duty_cycle
+    read = bench.ask(c.GET_IODI, 2).level, bench.ask(c.GET_IOADC, 2).value
+    assert put_out == (function is c.IOFunction.DO, 7.5 * (function is c.IOFunction.PWM))
+    assert read == (function.name.startswith("DI"), 1234 * (function is c.IOFunction.ADC))
+    assert bench.ask(c.GET_IODO, 2).level == 1, "the register keeps what was written"
+
+
+@pytest.mark.parametrize(("function", "level"), [(c.IOFunction.DIPU, 1), (c.IOFunction.DIPD, 0), (c.IOFunction.DI, 0)])
+def test_an_input_with_nothing_at_it_reads_its_resistor(function: c.IOFunction, level: int) -> None:
+    bench = Bench()
+    bench.configure(function, 3)
+    assert bench.ask(c.GET_IODI, 3).level == level
+    bench.arm.set_input(3, not level)
+    assert bench.ask(c.GET_IODI, 3).level == (not level)
+
+
 def test_inputs() -> None:
     bench = Bench()
+    bench.configure(c.IOFunction.DI, 7)
+    bench.configure(c.IOFunction.ADC, 8)
     bench.arm.set_input(7, 1)
     bench.arm.set_adc(8, 4095)
     assert bench.ask(c.GET_IODI, 7) == c.IODI(7, 1)
@@ -297,29 +330,36 @@ def test_inputs() -> None:
 def test_effectors() -> None:
     bench = Bench()
     bench.ask(c.SET_END_EFFECTOR_SUCTION_CUP, c.EndEffectorSuctionCup(is_ctrl_enabled=True, is_sucked=True))
+    assert not bench.arm.suction, "the air takes a moment"
+    bench.after(0.2)
     assert (bench.arm.suction, bench.arm.gripper, bench.arm.laser) == (True, False, 0)
     bench.ask(c.SET_END_EFFECTOR_SUCTION_CUP, c.EndEffectorSuctionCup(is_ctrl_enabled=False, is_sucked=True))
     bench.ask(c.SET_END_EFFECTOR_GRIPPER, c.EndEffectorGripper(is_ctrl_enabled=True, is_gripped=True))
     bench.ask(c.SET_END_EFFECTOR_LASER, c.EndEffectorLaser(is_ctrl_enabled=True, is_on=True))
+    assert (bench.arm.suction, bench.arm.gripper, bench.arm.laser) == (True, False, 100)
+    bench.after(0.5)
     assert (bench.arm.suction, bench.arm.gripper, bench.arm.laser) == (False, True, 100)
     assert [(executed.index, executed.command) for executed in bench.arm.executed][-1:] == [
         (None, c.SET_END_EFFECTOR_LASER)
     ]
     bench.ask(c.SET_END_EFFECTOR_GRIPPER, c.EndEffectorGripper(is_ctrl_enabled=False, is_gripped=True))
     bench.ask(c.SET_END_EFFECTOR_LASER, c.EndEffectorLaser(is_ctrl_enabled=False, is_on=True))
+    bench.after(0.5)
     assert (bench.arm.gripper, bench.arm.laser) == (False, 0)
 
 
 def test_queued_tools_and_outputs_are_seen_in_their_turn() -> None:
     def looked_at(look: Callable[[SimulatedMagician], Any]) -> tuple[Any, Any]:
         bench = Bench()
+        bench.configure(c.IOFunction.DO, 1)
+        bench.configure(c.IOFunction.PWM, 4)
         bench.put(c.SET_WAIT_CMD, c.WAITCmd(1000))
         bench.put(c.SET_END_EFFECTOR_SUCTION_CUP, c.EndEffectorSuctionCup(is_ctrl_enabled=True, is_sucked=True))
         bench.put(c.SET_END_EFFECTOR_GRIPPER, c.EndEffectorGripper(is_ctrl_enabled=True, is_gripped=True))
         bench.put(c.SET_IODO, c.IODO(1, 1))
         bench.put(c.SET_IOPWM, c.IOPWM(4, 1000, 25))
         bench.put(c.SET_E_MOTOR, c.EMotor(0, is_enabled=True, speed=100))
-        return look(bench.after(0.9)), look(bench.after(0.1))
+        return look(bench.after(0.9)), look(bench.after(0.6))
 
     assert looked_at(lambda arm: arm.suction) == (False, True)
     assert looked_at(lambda arm: arm.gripper) == (False, True)
@@ -346,8 +386,24 @@ def test_sensors() -> None:
     for port in c.InfraredPort:
         bench.ask(c.SET_INFRARED_SENSOR, c.InfraredSensor(enable=True, port=port))
 
+    assert bench.ask(c.GET_COLOR_SENSOR) == c.Color(0, 0, 0), "a sensor takes a moment"
+    assert bench.ask(c.GET_INFRARED_SENSOR, c.InfraredPort.GP4) == 0
+    bench.after(0.2)
     assert bench.ask(c.GET_COLOR_SENSOR) == c.Color(1, 2, 3)
     assert [bench.ask(c.GET_INFRARED_SENSOR, port) for port in c.InfraredPort] == [0, 0, 1, 0]
+
+
+def test_a_sensor_of_another_version_sees_nothing() -> None:
+    bench = Bench()
+    bench.arm.color, bench.arm.color_version = c.Color(1, 0, 0), c.AccessoryVersion.V2
+    bench.arm.infrared[c.InfraredPort.GP2], bench.arm.infrared_version = True, c.AccessoryVersion.V2
+    for version in c.AccessoryVersion:
+        seen = version is c.AccessoryVersion.V2
+        bench.ask(c.SET_COLOR_SENSOR, c.ColorSensor(enable=True, port=c.ColorPort.GP1, version=version))
+        bench.ask(c.SET_INFRARED_SENSOR, c.InfraredSensor(enable=True, port=c.InfraredPort.GP2, version=version))
+        bench.after(1)
+        assert bench.ask(c.GET_COLOR_SENSOR).r == seen
+        assert bench.ask(c.GET_INFRARED_SENSOR, c.InfraredPort.GP2) == seen
 
 
 def test_wifi() -> None:
@@ -386,6 +442,7 @@ def test_steppers() -> None:
     bench.put(c.SET_E_MOTOR_S, c.EMotorS(1, is_enabled=True, speed=0, distance=250))
     bench.after(1)
     first, second = bench.arm.motors
+    assert repr(second) == "<Motor at 500 pulses/s, 500 pulses so far>"
     assert [(first.speed, first.pulses), (second.speed, second.pulses)] == [(-10_000, -30_000), (500, 500)]
     bench.ask(c.SET_E_MOTOR, c.EMotor(0, is_enabled=False, speed=-10_000))
     bench.after(7)
@@ -550,6 +607,7 @@ def test_an_alarm_ends_the_command_and_the_rest_is_up_to_the_options(
 ) -> None:
     bench = Bench(options)
     bench.arm.guide_to(260, 0, 0)
+    bench.configure(c.IOFunction.DO, 1)
     bench.put(row, value)
     bench.put(c.SET_IODO, c.IODO(1, 1))
     index = bench.move(c.PTPMode.MOVJ_XYZ, 200, 0, 0)
@@ -602,12 +660,31 @@ def test_an_immediate_motion_waits_for_no_one() -> None:
     assert bench.ask(c.GET_QUEUED_CMD_CURRENT_INDEX) == 2
 
 
+@pytest.mark.parametrize("queued", [True, False])
+def test_an_immediate_motion_takes_the_place_of_the_one_that_goes_on(queued: bool) -> None:
+    bench = Bench()
+    far = c.PTPCmd(c.PTPMode.MOVJ_XYZ, 200, 150, 0)
+    if queued:
+        bench.put(c.SET_PTP_CMD, far)
+        bench.move(c.PTPMode.MOVJ_XYZ, 240, 0, 0)
+    else:
+        bench.ask(c.SET_PTP_CMD, far)
+
+    bench.after(0.3)
+    bench.ask(c.SET_PTP_CMD, c.PTPCmd(c.PTPMode.MOVJ_XYZ, 200, -50, 0))
+    assert 0 < bench.point[1] < 150, "it sets out from where the arm is"
+    outcomes = [(each.value.y, each.outcome) for each in bench.after(20).executed]
+    assert outcomes == [(150, "aborted"), (-50, "done"), *([(0, "done")] if queued else [])]
+    assert at(bench, 240, 0, 0, 0) if queued else at(bench, 200, -50, 0, 0)
+
+
 def test_rail() -> None:
     bench = Bench()
     there = c.PTPWithLCmd(c.PTPMode.MOVL_XYZ, 200, 0, 0, 0, 400)
     bench.put(c.SET_PTP_WITH_L_CMD, there)
     bench.after(10)
-    assert (bench.ask(c.GET_POSE_L), bench.ask(c.GET_DEVICE_WITH_L)) == (0, False)
+    assert math.isnan(bench.ask(c.GET_POSE_L)), "what arms without a rail answer"
+    assert (bench.arm.rail, bench.ask(c.GET_DEVICE_WITH_L)) == (0, False)
     bench.ask(c.SET_DEVICE_WITH_L, c.DeviceWithL(is_with_l=True))
     assert bench.ask(c.GET_DEVICE_WITH_L)
     bench.put(c.SET_PTP_WITH_L_CMD, there)
@@ -633,6 +710,7 @@ def test_outputs_switch_on_the_way(mode: c.PTPMode) -> None:
     bench.ask(c.SET_PTP_COMMON_PARAMS, c.PTPCommonParams(100, 100))
     bench.move(c.PTPMode.MOVL_XYZ, 200, -50, 0)
     bench.after(10)
+    bench.configure(c.IOFunction.DO, 3, 4)
     outputs = (c.ParallelOutputCmd(75, 3, 0), c.ParallelOutputCmd(25, 3, 1), c.ParallelOutputCmd(100, 4, 1))
     bench.put(c.SET_PTPPO_CMD, c.PTPPOCmd(mode, 200, 50, 0, 0, outputs))
     bench.after(0.001)
@@ -646,6 +724,7 @@ def test_outputs_switch_on_the_way(mode: c.PTPMode) -> None:
 
 def test_outputs_of_a_motion_that_is_stopped_do_not_switch() -> None:
     bench = Bench()
+    bench.configure(c.IOFunction.DO, 3, 4)
     outputs = (c.ParallelOutputCmd(0, 3, 1), c.ParallelOutputCmd(90, 4, 1))
     bench.put(c.SET_PTPPO_CMD, c.PTPPOCmd(c.PTPMode.MOVJ_XYZ, 200, 100, 0, 0, outputs))
     bench.after(0.3)
@@ -656,6 +735,7 @@ def test_outputs_of_a_motion_that_is_stopped_do_not_switch() -> None:
 
 def test_outputs_of_a_motion_on_the_spot() -> None:
     bench = Bench()
+    bench.configure(c.IOFunction.DO, 3, 4)
     outputs = (c.ParallelOutputCmd(0, 3, 1), c.ParallelOutputCmd(100, 4, 1))
     bench.put(c.SET_PTPPO_CMD, c.PTPPOCmd(c.PTPMode.MOVJ_INC, 0, 0, 0, 90, outputs))
     bench.after(0.1)
@@ -793,6 +873,66 @@ def test_lost_steps_are_found_when_asked_for_and_home_makes_them_good(options: D
     assert bench.faults == {0x50}
 
 
+@pytest.mark.parametrize("joint", [0, 5, -1])
+def test_only_joints_that_are_there_lose_steps(joint: int) -> None:
+    with pytest.raises(ValueError, match="1 to 4"):
+        Bench().arm.lose_steps(joint, 7)
+
+
+def true_point(bench: Bench) -> tuple[float, ...]:
+    pose = bench.arm.true_pose
+    return pose.x, pose.y, pose.z, pose.r
+
+
+def test_lost_steps_are_seen_in_the_true_pose_alone() -> None:
+    bench = Bench()
+    bench.put(c.SET_HOME_CMD, c.HOMECmd())
+    bench.after(5)
+    bench.arm.lose_steps(1, 10)
+    bench.move(c.PTPMode.MOVJ_ANGLE, 20, 40, 40, 0)
+    bench.after(10)
+    assert bench.joints == pytest.approx((20, 40, 40, 0))
+    assert (bench.arm.true_pose.j1, bench.arm.true_pose.j2) == pytest.approx((30, 40))
+    assert true_point(bench) == pytest.approx(Kinematics().forward(30, 40, 40, 0))
+
+
+def test_an_arm_does_not_know_where_it_is_before_it_is_homed() -> None:
+    bench = Bench()
+    bench.ask(c.SET_DEVICE_WITH_L, c.DeviceWithL(is_with_l=True))
+    assert [bench.arm.homed] == [False]
+    assert abs(bench.arm.true_pose.j1 - bench.joints[0]) > 1
+    assert (bench.arm.true_pose.j2, bench.arm.true_pose.j3) == bench.joints[1:3], "the two arms have angle sensors"
+    assert bench.arm.true_rail > 1
+    bench.put(c.SET_PTP_WITH_L_CMD, c.PTPWithLCmd(c.PTPMode.MOVJ_XYZ, 200, 50, 20, 0, 300))
+    bench.after(10)
+    assert at(bench, 200, 50, 20, 0)
+    assert math.dist(true_point(bench), bench.point) > 10
+    bench.put(c.SET_LOST_STEP_CMD)
+    assert bench.faults == set()
+
+    bench.put(c.SET_HOME_CMD, c.HOMECmd())
+    last = true_point(bench)
+    for _ in range(100):
+        bench.after(0.05)
+        assert math.dist(true_point(bench), last) < 30, "it is not carried away, it drives"
+        last = true_point(bench)
+
+    assert bench.arm.homed
+    assert at(bench, *HOME)
+    assert (bench.arm.true_pose, bench.arm.true_rail, bench.arm.rail) == (bench.arm.pose, 0, 0)
+
+
+def test_power_takes_away_what_the_arm_knew_of_its_place() -> None:
+    bench = Bench()
+    bench.put(c.SET_HOME_CMD, c.HOMECmd())
+    bench.move(c.PTPMode.MOVJ_ANGLE, 30, 40, 50, -60)
+    bench.after(20).power_cycle()
+    assert not bench.arm.homed
+    assert bench.joints == pytest.approx((0, 40, 50, 0))
+    true = bench.arm.true_pose
+    assert (true.j1, true.j2, true.j3, true.j4) == pytest.approx((30, 40, 50, -60))
+
+
 def test_levelling() -> None:
     bench = Bench()
     bench.put(c.SET_AUTO_LEVELING_CMD, c.AutoLevelingCmd(control_flag=True, precision=0.5))
@@ -840,6 +980,7 @@ def test_triggers(mode: c.TriggerMode, condition: int, threshold: int, holds: li
     found = []
     for value in [0, 1] if mode is c.TriggerMode.IO else [0, 1, 99, 100, 101]:
         bench = Bench()
+        bench.configure(c.IOFunction.DI if mode is c.TriggerMode.IO else c.IOFunction.ADC, 6)
         (bench.arm.set_input if mode is c.TriggerMode.IO else bench.arm.set_adc)(6, value)
         bench.put(c.SET_TRIG_CMD, c.TRIGCmd(6, mode, condition, threshold))
         if bench.after(10).executed:
@@ -850,6 +991,8 @@ def test_triggers(mode: c.TriggerMode, condition: int, threshold: int, holds: li
 
 def test_a_trigger_holds_the_queue_until_its_pin_changes() -> None:
     bench = Bench()
+    bench.configure(c.IOFunction.DI, 6)
+    bench.configure(c.IOFunction.DO, 1)
     bench.put(c.SET_TRIG_CMD, c.TRIGCmd(6, c.TriggerMode.IO, c.TriggerIOCondition.EQUAL, 1))
     bench.put(c.SET_IODO, c.IODO(1, 1))
     bench.after(10).set_adc(6, 1)
@@ -871,7 +1014,7 @@ def test_a_trigger_holds_the_queue_until_its_pin_changes() -> None:
         (c.JOGKey.AN_DOWN, {0x41}, 0, -125),
         (c.JOGKey.BP_DOWN, {0x42}, 1, 90),
         (c.JOGKey.BN_DOWN, {0x43}, 1, -5),
-        (c.JOGKey.CP_DOWN, {0x44}, 2, 85),
+        (c.JOGKey.CP_DOWN, {0x44}, 2, 90),
         (c.JOGKey.CN_DOWN, {0x48}, 2, -10),
         (c.JOGKey.DP_DOWN, {0x46}, 3, 150),
         (c.JOGKey.DN_DOWN, {0x47}, 3, -150),
@@ -979,13 +1122,15 @@ def test_a_queued_jog_goes_on_until_a_queued_idle() -> None:
 
 def test_the_rail_jogs_to_its_end() -> None:
     bench = Bench()
-    bench.jog(c.JOGKey.EP_DOWN)
+    bench.jog(c.JOGKey.EP_DOWN, joint=True)
     assert bench.after(5).rail == 0
     bench.ask(c.SET_DEVICE_WITH_L, c.DeviceWithL(is_with_l=True))
     bench.jog(c.JOGKey.EP_DOWN)
+    assert bench.after(5).rail == 0, "the rail's keys are those of a joint"
+    bench.jog(c.JOGKey.EP_DOWN, joint=True)
     assert bench.after(5).rail == pytest.approx(291)
     assert bench.after(20).rail == 1000
-    bench.jog(c.JOGKey.EN_DOWN)
+    bench.jog(c.JOGKey.EN_DOWN, joint=True)
     assert bench.after(20).rail == 0
     assert bench.faults == set()
     assert at(bench, *HOME)
@@ -1028,6 +1173,7 @@ def test_control_of_the_queue_is_never_queued() -> None:
 
 def test_a_full_queue_is_silent() -> None:
     bench = Bench(replace(MAGICIAN, capacity=1))
+    bench.configure(c.IOFunction.DO, 1)
     bench.put(c.SET_WAIT_CMD, c.WAITCmd(1000))
     assert bench.send(Frame(131, WRITE | QUEUED, b"\1\1")) is None
     bench.after(5)
@@ -1037,6 +1183,7 @@ def test_a_full_queue_is_silent() -> None:
 
 def test_a_full_queue_that_lies() -> None:
     bench = Bench(replace(MAGICIAN, capacity=1), Quirks(overflow="index"))
+    bench.configure(c.IOFunction.DO, 1)
     assert bench.put(c.SET_WAIT_CMD, c.WAITCmd(1000)) == 2
     assert bench.put(c.SET_IODO, c.IODO(1, 1)) == 3
     bench.after(5)
@@ -1163,6 +1310,7 @@ def test_a_program_is_stored_and_runs_from_the_key() -> None:
 
 def test_a_program_longer_than_the_queue_and_its_end_by_clear() -> None:
     bench = Bench(replace(MAGICIAN, capacity=2))
+    bench.configure(c.IOFunction.DO, 2)
     download(bench, 2**32 - 1, (c.SET_WAIT_CMD, c.WAITCmd(100)), (c.SET_IODO, c.IODO(1, 1)))
     bench.arm.run_program()
     bench.after(10.05)

@@ -14,7 +14,8 @@ from dobot_async.mycobot.frame import Frame, Parser, encode
 from dobot_async.mycobot.models import MODELS
 from dobot_async.mycobot.watch import turned
 from dobot_async.simulator import MyCobotQuirks, SimulatedMyCobot
-from dobot_async.simulator.mycobot_kinematics import KINEMATICS
+from dobot_async.simulator.mycobot_elbow import elbow_angle, turn_elbow
+from dobot_async.simulator.mycobot_kinematics import KINEMATICS, Chain
 from dobot_async.simulator.mycobot_ways import NO_INVERSE, NO_LINE, Ways
 from dobot_async.wire import Command
 
@@ -285,3 +286,177 @@ def test_no_bytes_break_an_arm(pieces: list[bytes]) -> None:
         bench.now += 0.1
 
     assert len(bench.ask(c.GET_ANGLES)) == 6
+
+
+FLAT = (
+    (-58.88, 34.27, -0.43, -67.5, -0.35, -76.2, 0.0),
+    (-58.88, 34.27, -0.43, -67.5, -0.35, 20.2, 0.0),
+    (40.25, 36.38, -0.52, -67.23, 0.26, -76.37, -0.35),
+)
+"""Postures of the vendor's examples: the whole arm lies nearly in one plane."""
+
+
+@pytest.mark.parametrize("posture", FLAT)
+def test_an_elbow_turns_out_of_a_flat_posture_and_leaves_the_tool_where_it_is(posture: tuple[float, ...]) -> None:
+    bench = Bench("myarm300")
+    for angle in (70, -70, 0, 45):
+        bench.arm.guide_to(*posture)
+        before = bench.ask(c.GET_COORDS)
+        bench.send(c.SET_SOLUTION_ANGLES, c.SetSolutionAngle(angle, 60))
+        bench.now += 20
+        after = bench.ask(c.GET_COORDS)
+        assert bench.arm.executed[-1].outcome == "done"
+        assert bench.ask(c.GET_SOLUTION_ANGLES) == pytest.approx(angle, abs=0.01)
+        assert after[:3] == pytest.approx(before[:3], abs=0.1)
+        assert turned(after[3:], before[3:]) < 0.1
+        assert bench.arm.joints[3] == posture[3]
+
+
+def test_an_elbow_of_a_stretched_arm_is_nowhere_and_one_beyond_the_joints_limits_is_not_reached() -> None:
+    bench = Bench("myarm300")
+    assert bench.ask(c.GET_SOLUTION_ANGLES) == 0
+    for joints, angle in ((0.0,) * 7, 10), (FLAT[0], 89):
+        bench.arm.guide_to(*joints)
+        bench.arm.ways.limits[0] = (-60, 20)
+        bench.send(c.SET_SOLUTION_ANGLES, c.SetSolutionAngle(angle, 60))
+        assert bench.ask(c.GET_ERROR_INFORMATION) == NO_INVERSE
+        assert not bench.ask(c.IS_MOVING)
+        bench.send(c.CLEAR_ERROR_INFORMATION)
+
+
+@settings(max_examples=50)
+@given(st.data())
+def test_an_elbow_is_where_it_was_told_to_be(data: st.DataObject) -> None:
+    model, chain = MODELS["myarm300"], KINEMATICS["myarm300"]
+    assert isinstance(chain, Chain)
+    joints = [data.draw(st.floats(low * 0.6, high * 0.6)) for low, high in model.joint_limits]
+    wanted = data.draw(st.floats(-89, 89))
+    found = turn_elbow(chain, joints, wanted, model.joint_limits)
+    if found is None:
+        return  # stretched, or beyond a limit
+
+    assert all(low - 0.01 <= each <= high + 0.01 for each, (low, high) in zip(found, model.joint_limits, strict=True))
+    assert abs((elbow_angle(chain, found) or 0.0) - wanted) < 0.01
+    here, there = chain.forward(joints), chain.forward(found)
+    assert there[:3] == pytest.approx(here[:3], abs=0.01)
+    assert turned(there[3:], here[3:]) < 0.01
+
+
+def test_servos_have_speeds_while_they_move() -> None:
+    bench = Bench()
+    assert bench.ask(c.GET_SERVO_SPEEDS) == (0,) * 6
+    bench.send(c.SEND_ANGLES, c.JointsMove((75, -37.5, 0, 0, 0, 0), 50))
+    bench.now = 0.6
+    first, second, *others = bench.ask(c.GET_SERVO_SPEEDS)
+    assert first == pytest.approx(75 * 4096 / 360, abs=10)
+    assert second == pytest.approx(-first / 2, abs=2)
+    assert others == [0] * 4
+    bench.send(c.PAUSE)
+    assert bench.ask(c.GET_SERVO_SPEEDS) == (0,) * 6
+    bench.send(c.RESUME)
+    assert bench.ask(c.GET_SERVO_SPEEDS)[0] == first
+    bench.send(c.STOP)
+    assert bench.ask(c.GET_SERVO_SPEEDS) == (0,) * 6
+    bench.send(c.JOG_ANGLE, c.JogJoint(1, c.Direction.DOWN, 20))
+    bench.now += 0.5
+    assert bench.ask(c.GET_SERVO_SPEEDS)[0] == pytest.approx(-30 * 4096 / 360, abs=10)
+
+
+def test_servos_that_are_dragged_are_no_faster_than_told() -> None:
+    bench = Bench("mycobot280", quirks=MyCobotQuirks(transponder=False))
+    encoders = (2048 + 1024, 2048 - 512, *(2048,) * 4)
+    bench.send(c.SET_ENCODERS_DRAG, c.SetEncodersDrag(encoders, (256, 1000, 0, 0, 0, 0)))
+    bench.now = 2.0
+    assert bench.ask(c.GET_SERVO_SPEEDS)[:2] == (256, -128)
+    bench.now = 3.9
+    assert bench.ask(c.IS_MOVING)  # 1024 steps at 256 a second
+    bench.now = 4.5
+    assert bench.ask(c.GET_ENCODERS) == encoders
+
+
+@pytest.mark.parametrize("joints", [(), (10, 20), (0,) * 7, (float("nan"), 0, 0, 0, 0, 0)])
+def test_a_hand_moves_as_many_joints_as_there_are(joints: tuple[float, ...]) -> None:
+    bench = Bench()
+    for guide in (bench.arm.guide_to, bench.arm.place):
+        with pytest.raises(ValueError, match="a myCobot 280 has 6 joints"):
+            guide(*joints)
+
+    assert bench.ask(c.GET_ANGLES) == (0,) * 6
+
+
+def test_what_names_a_servo_that_there_is_not_is_not_answered() -> None:
+    for model, there, not_there in (("mycobot280", 7, 8), ("myarm300", 8, 9), ("mypalletizer260", 7, 5)):
+        bench = Bench(model)
+        assert bench.ask(c.GET_ENCODER, there) == 0
+        if not_there < 9:
+            for command, value in (
+                (c.GET_ENCODER, not_there),
+                (c.IS_SERVO_ENABLE, not_there),
+                (c.GET_JOINT_MIN_ANGLE, there),
+                (c.GET_SERVO_DATA, c.ServoDataAddress(not_there, 21)),
+                (c.RELEASE_SERVO, c.Release(not_there)),
+                (c.FOCUS_SERVO, not_there),
+                (c.SEND_ANGLE, c.JointMove(there, 1)),
+                (c.SET_ENCODER, c.SetEncoder(not_there, 1000)),
+            ):
+                assert bench.send(command, value) == b"", command
+
+            assert not bench.arm.released
+
+
+def test_a_gripper_needs_power_and_stops_at_a_piece() -> None:
+    bench = Bench()
+    bench.send(c.SET_GRIPPER_STATE, c.SetGripperState(c.GripperState.OPEN, 50))
+    bench.now = 1.0
+    assert bench.ask(c.IS_GRIPPER_MOVING)
+    bench.arm.power(on=False)
+    assert bench.ask(c.GET_GRIPPER_VALUE) == 50
+    assert not bench.ask(c.IS_GRIPPER_MOVING)
+    bench.send(c.SET_GRIPPER_VALUE, c.SetGripperValue(100, 100))
+    bench.now = 5.0
+    assert bench.ask(c.GET_GRIPPER_VALUE) == 50
+    bench.arm.power(on=True)
+    bench.arm.gripper.piece = 30.0
+    bench.send(c.SET_GRIPPER_VALUE, c.SetGripperValue(0, 100))
+    bench.now = 10.0
+    assert bench.ask(c.GET_GRIPPER_VALUE) == 30
+    bench.send(c.SET_ENCODER, c.SetEncoder(7, 2048))
+    bench.now = 15.0
+    assert bench.ask(c.GET_GRIPPER_VALUE) == 100
+    assert Bench(quirks=MyCobotQuirks(gripper=False)).ask(c.GET_GRIPPER_VALUE) == 255
+
+
+def test_an_arm_with_play_comes_to_rest_beside_where_it_was_told_to() -> None:
+    bench = Bench(quirks=MyCobotQuirks(play=1.0))
+    for _ in range(2):
+        bench.send(c.SEND_ANGLES, c.JointsMove((10, 20, 30, 40, 50, 60), 100))
+        bench.now += 10
+        assert bench.ask(c.GET_ANGLES) == (11, 21, 29, 39, 51, 59)
+
+    start = bench.ask(c.GET_COORDS)
+    bench.send(c.SEND_COORDS, c.ToMove((*start[:2], start[2] - 20, *start[3:]), 50, c.MoveMode.LINEAR))
+    bench.now += 10
+    after = bench.ask(c.GET_COORDS)
+    assert 1 < max(abs(a - b) for a, b in zip(after[:3], (*start[:2], start[2] - 20), strict=True)) < 6
+
+
+def test_a_line_is_followed_in_fresh_mode_0_alone() -> None:
+    ways = []
+    for fresh in (False, True):
+        bench = Bench()
+        bench.arm.guide_to(20, -20, -60, 40, 10, 0)
+        bench.send(c.SEND_COORDS, c.ToMove((150, 80, 200, -180, 0, -90), 100, c.MoveMode.ANGULAR))
+        bench.now = 10
+        bench.send(c.SET_FRESH_MODE, fresh)
+        bench.send(c.SEND_COORDS, c.ToMove((150, -80, 200, -180, 0, -90), 50, c.MoveMode.LINEAR))
+        off = 0.0
+        while bench.ask(c.IS_MOVING):
+            bench.now += 0.05
+            here = bench.ask(c.GET_COORDS)
+            off = max(off, abs(here[0] - 150), abs(here[2] - 200))
+
+        assert here[1] == pytest.approx(-80, abs=0.2)
+        ways.append(off)
+
+    assert ways[0] < 0.5
+    assert ways[1] > 10

@@ -64,7 +64,7 @@ class Vendor:
 @asynccontextmanager
 async def vendor(quirks: UltraArmQuirks = NONE) -> AsyncIterator[Vendor]:
     """The library, connected."""
-    async with simulate("ultraarm", listen="pty", speed=SPEED, quirks=quirks) as sim:
+    async with simulate("ultraarm", homed=True, listen="pty", speed=SPEED, quirks=quirks) as sim:
         library: Any = await asyncio.to_thread(ultraArmP340, sim.url.removeprefix("serial://"))
         try:
             yield Vendor(sim, library)

@@ -21,10 +21,10 @@ PLAIN = UltraArmQuirks(acknowledge="ok")
 class Bench:
     """An arm, a clock, and one client."""
 
-    def __init__(self, quirks: UltraArmQuirks = PLAIN, capacity: int = 100) -> None:
+    def __init__(self, quirks: UltraArmQuirks = PLAIN, capacity: int = 100, *, homed: bool = True) -> None:
         self.now = 0.0
         options = DeviceOptions(capacity, False, 1, 0, power_up_alarms=frozenset())
-        self.arm = SimulatedUltraArm(lambda: self.now, options, quirks)
+        self.arm = SimulatedUltraArm(lambda: self.now, options, quirks, homed=homed)
         self.session = self.arm.session()
 
     def __call__(self, text: str) -> str:
@@ -61,7 +61,7 @@ def test_blanks_case_and_zeros_count_for_nothing(line: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["G1 X5", "M99", "hello", "G0 Q5", "M10 J5 A0", "M21 P256", "M25 A50", "Ü", "G0 X1e-07"]
+    "line", ["G2 X5", "G4 S0.5", "M30", "M99", "hello", "G0 Q5", "M10 J5 A0", "M21 P256", "M25 A50", "Ü", "G0 X1e-07"]
 )
 def test_what_it_does_not_know(line: str) -> None:
     bench = Bench()
@@ -169,6 +169,9 @@ def test_when_m17_releases(release: str, left: int) -> None:
     assert not bench.arm.registers.powered
     bench("M18\rG0 X230\r")
     bench.now = 2000
+    assert bench.arm.missed == 1, "it does not know where it is"
+    bench("G28\rG0 X230\r")
+    bench.now = 3000
     assert bench.arm.pose.x == pytest.approx(230)
 
 
@@ -227,6 +230,9 @@ def test_readings_of_later_firmware() -> None:
         bench("G6\rG7\rM32\rM31\r") == "GetSystemVersion[1.2]\r\nGetModifyVersion[3]\r\nJ1CAL[12]\r\nQUEUE SIZE[0]\r\n"
     )
     bench("M25 A60 F200 M1 T1\rM29 T1 L30\rM51 X7 Y56 Z2048 P2 \r")
+    bench.now = 0.3
+    assert bench("M50\r") == "GRIPPERANGLE[30]\r\n", "it takes its time, and M50 needs no T"
+    bench.now = 1.0
     answers = "GRIPPERANGLE[60]\r\nGetGripperPosition[60,30]\r\nReadSYS[2048]\r\n"
     assert bench("M50 T1\rM30 T1\rM52 J7 S56 P2 \r") == answers
     bench("M17\r")
@@ -244,7 +250,58 @@ def test_power_and_hands() -> None:
     assert not bench.arm.registers.relative
     assert bench.arm.queue_size == 0
     bench.arm.guide_to(10, 20, 30, 0)
-    assert bench("M12\r") == "DATA: ANGLES[10.00 ,20.00 ,30.00 ,0.00]\r\n"
+    assert bench.arm.angles == c.UltraArmAngles(10, 20, 30, 0)
+    assert bench("M12\r") == "DATA: ANGLES[0.00 ,0.00 ,0.00 ,0.00]\r\n", "it does not know where it is"
+    assert bench("M119\r") == "DATA : ENDSTOP[0 ,0 ,0]\r\n"
+
+
+@pytest.mark.parametrize("forgets", ["switched on", "M17", "power cycle"])
+@pytest.mark.parametrize("line", ["G0 X200", "G1 X200", "M10 J1 A5", "M11 X5 Y5 Z5", "M13 J1 D0 F10", "M14 J3 D1 F10"])
+def test_nothing_moves_it_until_it_was_home(line: str, forgets: str) -> None:
+    bench = Bench(homed=forgets != "switched on")
+    if forgets == "M17":
+        bench("M11 X10 Y10 Z10 F200\r")
+        bench.now = 10
+        bench("M17\r")
+        assert bench("M12\r") == "DATA: ANGLES[10.00 ,10.00 ,10.00 ,0.00]\r\n"
+        bench.arm.guide_to(30, 30, 30, 0)
+        bench("M18\r")
+        assert bench("M12\r") == "DATA: ANGLES[10.00 ,10.00 ,10.00 ,0.00]\r\n", "its motors sense nothing"
+    elif forgets == "power cycle":
+        bench.arm.power_cycle()
+
+    before = bench.arm.angles
+    assert bench(f"{line}\r") == "ok\r\n", "of which it says nothing"
+    bench.now = 20
+    bench("M15\r")
+    assert bench.arm.angles == before
+    assert bench.arm.missed == 1
+    bench("G28\r")
+    bench.now = 40
+    assert bench.arm.registers.homed
+    bench(f"{line}\r")
+    bench.now = 41
+    bench("M15\r")
+    assert bench.arm.angles != before
+    assert bench.arm.missed == 1
+
+
+@pytest.mark.parametrize("word", ["G0", "G1"])
+def test_motions_of_the_tool_are_straight(word: str) -> None:
+    bench = Bench()
+    bench("G0 X200 Y-150 Z40 F200\r")
+    bench.now = 10
+    bench(f"{word} X200 Y150 Z40\r")
+    for step in range(30):
+        bench.now = 10 + step / 10
+        assert bench.arm.pose.x == pytest.approx(200)
+        assert bench.arm.pose.z == pytest.approx(40)
+
+    assert bench.arm.pose.y == pytest.approx(150)
+    bench("G0 X-200 Y0\r")  # through the base
+    bench.now = 30
+    assert bench.arm.missed == 1
+    assert bench.arm.pose.y == pytest.approx(150)
 
 
 @given(st.floats(*REACH.j1), st.floats(*REACH.j2), st.floats(*REACH.j3))
@@ -278,6 +335,7 @@ def test_each_row_is_understood_as_it_is_sent() -> None:
         c.WAIT: c.Dwell(0),
         c.MOVE_COORDS: c.CoordsMove(200, f=100),
         c.MOVE_BY: c.CoordsMove(z=-5),
+        c.MOVE_LINE: c.CoordsMove(200, f=100),
         c.SET_POSITION: c.Position(0),
         c.MOVE_JOINT: c.JointMove(1, 5),
         c.MOVE_JOINTS: c.JointsMove(1, 2, 3),

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from virtual import virtual
 
-from dobot_async import ArmAlarm, MotionStopped, UltraArm
+from dobot_async import ArmAlarm, CommandRejected, MotionStopped, UltraArm
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.gcode import parse_gcode
@@ -40,18 +40,19 @@ def read(*lines: str, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> list[tuple[
 
 
 def moves(sim: Simulation) -> list[tuple[float | None, ...]]:
-    return [(each.value.x, each.value.y) for each in sim.arm.executed if each.command is c.MOVE_COORDS]
+    rows = {c.MOVE_COORDS, c.MOVE_LINE}
+    return [(each.value.x, each.value.y) for each in sim.arm.executed if each.command in rows]
 
 
 def test_a_program() -> None:
     assert read(*SQUARE) == [
         ("G90", None),
-        ("G0", c.CoordsMove(200, 0, 40, f=100)),
-        ("G0", c.CoordsMove(y=20, f=100)),
-        ("G0", c.CoordsMove(x=220, f=100)),
+        ("G1", c.CoordsMove(200, 0, 40, f=100)),
+        ("G1", c.CoordsMove(y=20, f=100)),
+        ("G1", c.CoordsMove(x=220, f=100)),
         ("G91", None),
-        ("G0", c.CoordsMove(y=-20, f=100)),
-        ("G0", c.CoordsMove(x=-20, f=100)),
+        ("G1", c.CoordsMove(y=-20, f=100)),
+        ("G1", c.CoordsMove(x=-20, f=100)),
         ("M3", None),
         ("G4", c.Dwell(1)),
         ("M21", c.PWM(200)),
@@ -101,7 +102,11 @@ def test_lines(lines: Sequence[str], commands: Sequence[tuple[str, Any]]) -> Non
         ("M11 X0 Y0 Z90", "j3 must be in -5 to 60"),
         ("M11 X0 Y0", "Z is missing"),
         ("G4", "S is missing"),
-        ("G4 S0.5", "whole number"),
+        ("G4 S-1", "seconds must be in"),
+        ("G4 S70000", "seconds must be in"),
+        ("G0 X200 X210", "a letter twice"),
+        ("X2%00", "no G-code"),
+        ("G0 X200 ((nested) Y5)", "no G-code"),
         ("G1.5 X10", "no command G1.5"),
         ("G0 X--5", "no number|no G-code"),
     ],
@@ -145,9 +150,11 @@ def test_any_text_is_a_program_or_wrong_with_its_line(lines: list[str]) -> None:
 @virtual
 async def test_a_program_runs() -> None:
     told: list[tuple[int, int]] = []
-    async with simulate("ultraarm", speed=20) as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True, speed=20) as sim, UltraArm.connect(sim.url) as arm:
         await arm.run_gcode(SQUARE, progress=lambda done, of: told.append((done, of)))
-        assert moves(sim) == [(200, 0), (None, 20), (220, None), (None, -20), (-20, None)]
+        assert moves(sim) == [(200, 0), (None, 20), (220, None), (None, 0), (200, None)]
+        assert {each.name for each in sim.arm.executed} >= {"G1", "M3", "M5"}
+        assert "G0" not in {each.name for each in sim.arm.executed}
         assert told == [(done, 11) for done in range(1, 12)]
         assert not sim.arm.registers.relative, "a program leaves the arm in absolute coordinates"
         assert abs(sim.arm.pose.x - 200) < 0.01
@@ -156,7 +163,7 @@ async def test_a_program_runs() -> None:
 
 @virtual
 async def test_a_program_tells_what_is_done_as_it_goes() -> None:
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
         run = arm.run_gcode(["G0 X200 Y0 Z40 F100", "G0 X210", "M3"], constant_speed=True)
         seen = [(line.number, len(moves(sim))) async for line in run]
 
@@ -167,7 +174,7 @@ async def test_a_program_tells_what_is_done_as_it_goes() -> None:
 
 @virtual
 async def test_a_dry_run_sends_nothing() -> None:
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
         before = sim.arm.counters.requests
         run = arm.run_gcode(SQUARE, dry_run=True)
         await run
@@ -184,7 +191,7 @@ async def test_a_dry_run_sends_nothing() -> None:
 
 @virtual
 async def test_a_line_that_fails_is_named() -> None:
-    async with simulate("ultraarm", speed=20) as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True, speed=20) as sim, UltraArm.connect(sim.url) as arm:
         with pytest.raises(ArmAlarm) as caught:
             await arm.run_gcode(["G0 X200 Y0 Z40", "G0 X10 Y0 Z0"])
 
@@ -195,7 +202,7 @@ async def test_a_line_that_fails_is_named() -> None:
 @virtual
 async def test_who_leaves_a_program_stops_the_arm() -> None:
     program = [f"G0 X{150 + step} Y{100 * (-1) ** step} Z40 F20" for step in range(50)]
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
         with pytest.raises(TimeoutError):
             async with asyncio.timeout(3):
                 await arm.run_gcode(program)
@@ -203,14 +210,14 @@ async def test_who_leaves_a_program_stops_the_arm() -> None:
         assert not sim.arm.device.moving
         assert len(moves(sim)) < 5
 
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
         run = arm.run_gcode(program)
         lines = aiter(run)
         await anext(lines)
         await lines.aclose()  # type: ignore[attr-defined]
         assert not sim.arm.device.moving
 
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
         running = asyncio.ensure_future(arm.run_gcode(program)._run())
         await asyncio.sleep(1)
         await arm.stop()
@@ -222,10 +229,64 @@ async def test_who_leaves_a_program_stops_the_arm() -> None:
 
 @virtual
 async def test_a_long_program_does_not_fill_the_queue() -> None:
-    async with simulate("ultraarm", speed=50) as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True, speed=50) as sim, UltraArm.connect(sim.url) as arm:
         await arm.run_gcode(f"G0 X{180 + step / 4} Y0 Z40 F200" for step in range(200))
         assert [x for x, _ in moves(sim)] == [180 + step / 4 for step in range(200)]
         assert sim.arm.counters.overflowed == 0
+
+
+@virtual
+async def test_a_program_that_fails_leaves_neither_increments_nor_constant_speed() -> None:
+    async with simulate("ultraarm", homed=True, speed=20) as sim, UltraArm.connect(sim.url) as arm:
+        program = ["G0 X200 Y0 Z40 F100", "G91", "G1 X10", "G90", "G1 X10 Y0 Z0", "G91", "G1 X5"]
+        with pytest.raises(ArmAlarm) as caught:
+            await arm.run_gcode(program, constant_speed=True)
+
+        assert caught.value.__notes__ == ["line 5 (G1 X10 Y0 Z0)"]
+        await arm.move_to(220, 0, 40)
+        assert not sim.arm.registers.relative
+        assert sim.arm.registers.speed_mode == c.SpeedMode.RAMPED
+        assert moves(sim)[-1] == (220, 0)
+        assert abs(sim.arm.pose.x - 220) < 0.01
+
+
+@virtual
+async def test_of_increments_the_goal_is_checked() -> None:
+    program = ["G0 X200 Y0 Z100 F100", "G91", "G1 Z-140"]
+    async with simulate("ultraarm", homed=True, speed=20) as sim, UltraArm.connect(sim.url) as arm:
+        await arm.run_gcode(program)
+        assert abs(sim.arm.pose.z + 40) < 0.01
+        before = sim.arm.counters.requests
+        with pytest.raises(ValueError, match=r"^line 4: z must be in -130 to 135, not -180"):
+            arm.run_gcode([*program, "Z-140"])
+
+        assert sim.arm.counters.requests == before
+        # From where nobody knows yet, it shows when its turn comes, and nothing is sent.
+        with pytest.raises(CommandRejected, match="z must be in -130 to 135, not -180") as caught:
+            await arm.run_gcode(["G91", "G1 Z-140"])
+
+        assert caught.value.__notes__ == ["line 2 (G1 Z-140)"]
+        assert abs(sim.arm.pose.z + 40) < 0.01
+
+
+@virtual
+async def test_a_fraction_of_a_second_is_waited() -> None:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
+        before = sim.arm.device.now
+        await arm.run_gcode(["G4 S0.5", "M23"])
+        (pump,) = (each for each in sim.arm.executed if each.command is c.PUMP_ON)
+        assert pump.started >= before + 0.5
+        before = sim.arm.device.now
+        await arm.run_gcode(["G04 S1.25", "M22"])
+        (pump,) = (each for each in sim.arm.executed if each.command is c.PUMP_OFF)
+        assert pump.started >= before + 1.25
+
+
+@pytest.mark.parametrize("end", ["\x0b", "\x0c", "\x1c", "\x85", "\u2028"])
+def test_nothing_but_a_line_feed_ends_a_comment(end: str, tmp_path: Path) -> None:
+    file = tmp_path / "part.gcode"
+    file.write_bytes(f"G28 ; and then{end}G0 X200\r\nG0 X210\n".encode())
+    assert [(each.number, each.value) for each in parse_gcode(file)] == [(1, None), (2, c.CoordsMove(210))]
 
 
 async def test_a_file(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_the_manuals_requests(line: str, row: Command[Any, Any], value: Any) -> 
 
 
 def test_every_command_of_the_manual_has_its_example() -> None:
-    of_the_manual = {row for row in c.ALL if row.section != "pymycobot"} - {c.MOVE_BY}
+    of_the_manual = {row for row in c.ALL if row.section not in {"pymycobot", "G-code programs"}} - {c.MOVE_BY}
     assert {row for _, row, _ in MANUAL} == of_the_manual
 
 
@@ -246,10 +246,11 @@ def test_ranges(row: Command[Any, Any], value: Any) -> None:
         row.request.encode(value)
 
 
-def test_a_fraction_is_no_whole_number() -> None:
-    seconds: Any = 0.5
-    with pytest.raises(TypeError, match="whole"):
-        c.WAIT.request.encode(c.Dwell(seconds))
+@pytest.mark.parametrize(("seconds", "sent"), [(0.5, "S0"), (1.0, "S1"), (2.99, "S2"), (65535, "S65535")])
+def test_of_a_wait_whole_seconds_alone_are_sent(seconds: float, sent: str) -> None:
+    assert text(c.WAIT, c.Dwell(seconds)) == f"G4 {sent}\r"
+    with pytest.raises(ProtocolError, match="whole"):
+        c.WAIT.request.decode(b"S0.5")
 
 
 def test_a_value_of_another_command_is_refused() -> None:
@@ -455,6 +456,7 @@ def values() -> list[Row]:
     given = {row: value for _, row, value in MANUAL}
     asked: dict[Command[Any, Any], Any] = {
         c.MOVE_BY: c.CoordsMove(z=5),
+        c.MOVE_LINE: c.CoordsMove(z=5),
         c.SET_SPEED_MODE: c.ModeOfSpeed(c.SpeedMode.CONSTANT),
         c.SET_GRIPPER_CLOSE_POSITION: c.GripperClosePosition(c.GripperMode.ADAPTIVE, 20),
         c.GET_GRIPPER_POSITION: c.ModeOfGripper(c.GripperMode.ADAPTIVE),

@@ -50,7 +50,7 @@ async def bridged(
     listen: str | list[str] = TCP, *, speed: float = 20.0, quirks: UltraArmQuirks = PLAIN, **details: Any
 ) -> AsyncIterator[Rig]:
     async with (
-        simulate("ultraarm", listen=TCP, speed=speed, quirks=quirks) as sim,
+        simulate("ultraarm", homed=True, listen=TCP, speed=speed, quirks=quirks) as sim,
         over(sim.url, listen, **details) as (running, happened),
     ):
         yield Rig(sim, running, happened)
@@ -129,8 +129,9 @@ async def test_others_watch_while_one_moves_and_hear_that_they_may_not_move(ackn
     async with bridged(quirks=UltraArmQuirks(acknowledge=acknowledge)) as rig, UltraArm.connect(rig.bridge.url) as arm:
         async with UltraArm.connect(rig.bridge.url) as other:
             motion = await arm.queue.move_to(200, 100, 40)
+            await until(lambda: rig.sim.arm.device.moving)
             with pytest.raises(CommandRejected, match="moves the arm"):
-                await other.queue.move_to(200, 0, 40)
+                await other.request(c.PUMP_ON, None)
 
             assert (await other.get_coords()).x > 0
             assert not (await other.get_angles()).j4
@@ -546,3 +547,18 @@ def end(watch: UltraArmWatch, line: bytes) -> None:
     """Something is switched off, which is acknowledged."""
     watch.sent(Line(line))
     watch.answered(Line(line), Line(b"ok\r\n"))
+
+
+@pytest.mark.parametrize("cut", range(1, 12))
+@pytest.mark.parametrize("token", [b"TOKEN abc\n", b""])
+def test_a_token_that_nobody_asked_for_spoils_no_command(token: bytes, cut: int) -> None:
+    stream = token + b"M120\rT\rG0 X200\r"
+    parser = Requests()
+    found = [*parser.feed(stream[:cut]), *parser.feed(stream[cut:])]
+    assert [line.text for line in found] == [b"M120\r", b"T\r", b"G0 X200\r"]
+
+
+async def test_a_client_with_a_token_at_a_bridge_without_one() -> None:
+    async with bridged() as rig, UltraArm.connect(f"{rig.bridge.url}?token=abc") as arm:
+        assert (await arm.get_coords()).x > 0
+        assert arm.link.stats.repeated == arm.link.stats.unexpected == 0

@@ -10,7 +10,7 @@ import pytest
 from ultraarm_line import Spoil, once, rig
 from virtual import run_virtual, virtual
 
-from dobot_async import ArmAlarm, CommandRejected, MotionUnknown, ReplyTimeout, UltraArm
+from dobot_async import ArmAlarm, MotionUnknown, ReplyTimeout, UltraArm
 from dobot_async.simulator import DeviceOptions, Faults, Simulation, UltraArmQuirks, simulate
 from dobot_async.ultraarm import commands as c
 
@@ -104,41 +104,44 @@ def test_a_spoilt_answer_moves_nothing_twice(
 
 
 @pytest.mark.parametrize("spoil", [lose, without_command], ids=lambda each: each.__name__)
-def test_a_relative_motion_that_may_be_lost_stops_the_arm(spoil: Spoil, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("acknowledge", ["size", "ok"])
+def test_an_increment_that_is_lost_is_sent_again_and_done_once(
+    spoil: Spoil, acknowledge: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It goes over the line as a place, which does no harm twice."""
+
     async def run() -> None:
-        async with rig(monkeypatch, sim=FAST) as (sim, arm, line):
+        sim_options = {**FAST, "quirks": UltraArmQuirks(acknowledge=acknowledge)}
+        async with rig(monkeypatch, sim=sim_options) as (sim, arm, line):
             await arm.move_to(205, 0, 40)
-            line.request = once(b"Z5", spoil)
-            if spoil is lose:
-                with pytest.raises(MotionUnknown, match="G91"):
-                    await arm.move_by(z=5)
-
-                assert not [each for each in sim.arm.executed if each.value == c.CoordsMove(z=5, f=50)]
-
-            await arm.move_to(210, 0, 40)
-            assert abs(sim.arm.pose.x - 210) < 0.01
-            assert not sim.arm.registers.relative
+            line.request = once(b"Z45", spoil)
+            await arm.move_by(z=5)
+            assert abs(sim.arm.pose.z - 45) < 0.01
+            assert [each.value.z for each in sim.arm.executed if each.name == "G0"] == [40, 45]
 
     run_virtual(run())
 
 
-@virtual
-async def test_a_relative_motion_among_others_is_counted() -> None:
-    """It is known to be taken although nothing acknowledges it, for more waits than before."""
-    with pytest.MonkeyPatch.context() as patch:
-        async with rig(patch) as (sim, arm, line):
-            await arm.queue.move_to(200, 100, 40, speed=20)
+@pytest.mark.parametrize("spoil", [lose, late(0.3), late(1.8)], ids=["lost", "a little late", "late"])
+def test_an_increment_whose_answer_is_spoilt_is_done_once(spoil: Spoil, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def run() -> None:
+        async with rig(monkeypatch, sim=FAST) as (sim, arm, line):
+            await arm.move_to(205, 0, 40)
 
             def armed(data: bytes) -> list[tuple[float, bytes]]:
-                if b"Z5" in data:
-                    line.reply = once(b"COORDS", lose)
+                if b"Z45" in data:
+                    line.reply = once(b"COORDS", spoil)
 
                 return [(0, data)]
 
             line.request = armed
-            await arm.queue.move_by(z=5)
-            await arm.queue.join()
-            assert [each.value.z for each in sim.arm.executed if each.name == "G0"] == [40, 5]
+            for _ in range(2):
+                await arm.move_by(z=5)
+
+            assert abs(sim.arm.pose.z - 50) < 0.01
+            assert [each.value.z for each in sim.arm.executed if each.name == "G0"] == [40, 45, 50]
+
+    run_virtual(run())
 
 
 @pytest.mark.parametrize("seconds", [0.05, 0.3, 1.4, 2.5])
@@ -237,7 +240,7 @@ def test_many_moves_on_a_terrible_line(seed: int, acknowledge: Any) -> None:
         options = DeviceOptions(20, False, 1, 0, power_up_alarms=frozenset())
         quirks = UltraArmQuirks(acknowledge=acknowledge)
         async with (
-            simulate("ultraarm", faults=faults, seed=seed, speed=20, options=options, quirks=quirks) as sim,
+            simulate("ultraarm", homed=True, faults=faults, seed=seed, speed=20, options=options, quirks=quirks) as sim,
             UltraArm.connect(sim.url, timeout=30) as arm,
         ):
             wanted = [180 + step / 4 for step in range(150)]
@@ -252,7 +255,7 @@ def test_many_moves_on_a_terrible_line(seed: int, acknowledge: Any) -> None:
 
 @virtual
 async def test_a_link_that_is_reopened_goes_on() -> None:
-    async with simulate("ultraarm", speed=5) as sim, UltraArm.connect(sim.url, reconnect=True) as arm:
+    async with simulate("ultraarm", homed=True, speed=5) as sim, UltraArm.connect(sim.url, reconnect=True) as arm:
         motions = [await arm.queue.move_to(200 + 10 * step, 0, 40) for step in range(4)]
         sim.unplug()
         for motion in motions:
@@ -264,18 +267,31 @@ async def test_a_link_that_is_reopened_goes_on() -> None:
 
 @virtual
 async def test_an_arm_that_was_switched_off_meanwhile_is_noticed() -> None:
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url, reconnect=True) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url, reconnect=True) as arm:
         motions = [await arm.queue.move_to(200 + 10 * step, 0, 40, speed=10) for step in range(4)]
+        await asyncio.sleep(0.5)
         sim.arm.power_cycle()
         sim.unplug()
-        with pytest.raises(ArmAlarm, match="came to rest"):
-            await motions[-1]
+        for motion in motions:
+            with pytest.raises(ArmAlarm, match="came to rest"):
+                await motion
 
-        relative = await arm.queue.move_by(z=-50, speed=10)
-        sim.arm.power_cycle()
-        sim.unplug()
-        with pytest.raises((MotionUnknown, CommandRejected)):
-            await relative
+
+@pytest.mark.parametrize("verb", ["home", "wait"])
+def test_what_no_place_tells_of_is_unknown_after_an_outage(verb: str) -> None:
+    async def run() -> None:
+        async with (
+            simulate("ultraarm", homed=True) as sim,
+            UltraArm.connect(sim.url, reconnect=True, home_switches=None) as arm,
+        ):
+            motion = await (arm.queue.home() if verb == "home" else arm.queue.wait(3))
+            await asyncio.sleep(0.5)
+            sim.arm.power_cycle()
+            sim.unplug()
+            with pytest.raises(MotionUnknown, match="switched off"):
+                await motion
+
+    run_virtual(run())
 
 
 @virtual

@@ -32,7 +32,7 @@ Call = Callable[[UltraArm], Coroutine[Any, Any, object]]
 async def dead_line(**options: Any) -> AsyncIterator[tuple[Simulation, UltraArm, Faults]]:
     """An arm, and its faults: `silent` loses all, `stalled` keeps it back."""
     faults = Faults()
-    async with simulate("ultraarm", faults=faults) as sim, UltraArm.connect(sim.url, **options) as arm:
+    async with simulate("ultraarm", homed=True, faults=faults) as sim, UltraArm.connect(sim.url, **options) as arm:
         yield sim, arm, faults
 
 
@@ -47,8 +47,9 @@ async def program(arm: UltraArm) -> None:
 
 async def batch(arm: UltraArm) -> None:
     async with arm.queue.batch() as found:
-        for step in range(20):
-            found.move_to(200 + step, 0, 40, speed=10)
+        motions = [found.move_to(200 + step, 0, 40, speed=10) for step in range(20)]
+
+    await motions[-1]
 
 
 async def put_and_wait(arm: UltraArm) -> None:
@@ -152,7 +153,7 @@ def test_once_the_line_is_back_the_arm_stands_within_a_second(
     async def run() -> None:
         faults = Faults(latency=0.01)
         async with (
-            simulate("ultraarm", faults=faults, quirks=firmware) as sim,
+            simulate("ultraarm", homed=True, faults=faults, quirks=firmware) as sim,
             UltraArm.connect(sim.url, on_error="leave") as arm,
         ):
             if call == "stop":
@@ -185,7 +186,7 @@ def test_once_the_line_is_back_the_arm_stands_within_a_second(
 def test_a_block_left_on_a_silent_line_stops_arm_and_laser_when_it_is_back_in_time(silence: float) -> None:
     async def run() -> None:
         faults = Faults()
-        async with simulate("ultraarm", faults=faults) as sim:
+        async with simulate("ultraarm", homed=True, faults=faults) as sim:
             with pytest.raises(RuntimeError):
                 async with UltraArm.connect(sim.url) as arm:
                     await arm.laser(True)
@@ -204,10 +205,11 @@ def test_a_block_left_on_a_silent_line_stops_arm_and_laser_when_it_is_back_in_ti
 @virtual
 async def test_an_arm_that_is_told_to_stop_again_and_again_but_goes_on() -> None:
     quirks = UltraArmQuirks(release="queued")
-    async with simulate("ultraarm", quirks=quirks) as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True, quirks=quirks) as sim, UltraArm.connect(sim.url) as arm:
         for step in range(12):
             await arm.queue.move_to(150, 100 * (-1) ** step, 40, speed=10)
 
+        await asyncio.sleep(0.5)
         loop = asyncio.get_running_loop()
         before = loop.time()
         with pytest.raises(CommandRejected, match="switch it off"):
@@ -220,7 +222,8 @@ async def test_an_arm_that_is_told_to_stop_again_and_again_but_goes_on() -> None
 @virtual
 async def test_silence_ends_motions_as_unknown_and_stops_the_arm_when_it_is_over() -> None:
     async with dead_line() as (sim, arm, faults):
-        motions = [await arm.queue.move_to(150, 150 * (-1) ** step, 40, speed=5) for step in range(3)]
+        motions = [await arm.queue.move_to(150, 150 * (-1) ** step, 40, speed=2) for step in range(3)]
+        await asyncio.sleep(0.5)
         faults.silent = True
         loop = asyncio.get_running_loop()
         before = loop.time()
@@ -293,7 +296,7 @@ async def test_a_program_whose_progress_fails_stops_the_arm() -> None:
     def progress(_done: int, _of: int) -> None:
         raise RuntimeError
 
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
         with pytest.raises(RuntimeError):
             await arm.run_gcode([f"G0 X{200 + step} Y0 Z40 F10" for step in range(5)], progress=progress)
 
@@ -303,7 +306,7 @@ async def test_a_program_whose_progress_fails_stops_the_arm() -> None:
 
 @virtual
 async def test_a_jog_beside_a_queued_motion_does_not_end_it() -> None:
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
         motion = await arm.queue.move_to(200, 0, 40, speed=20)
         await arm.jog_stop()
         assert sim.arm.registers.powered
@@ -312,7 +315,7 @@ async def test_a_jog_beside_a_queued_motion_does_not_end_it() -> None:
 
 @virtual
 async def test_a_batch_that_is_left_sends_nothing() -> None:
-    async with simulate("ultraarm") as sim, UltraArm.connect(sim.url) as arm:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
         with pytest.raises(RuntimeError):
             async with arm.queue.batch() as found:
                 motion = found.move_to(200, 0, 40)

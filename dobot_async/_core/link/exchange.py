@@ -19,6 +19,7 @@ from typing import Any, Generic, TypeVar
 
 from dobot_async._core.link.connection import Connection, Reopen
 from dobot_async._core.link.correlator import Correlator, Outcome, Request
+from dobot_async._core.link.deadlines import Deadlines, release
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.link.silence import Silence
 from dobot_async._core.link.stragglers import Stragglers
@@ -66,6 +67,7 @@ class Exchange(Connection, Generic[F]):
         self._filler = filler
         self._silence = Silence(self.url, self._loop.time)
         self._losses = 0  # that the log has not told yet
+        self._deadlines = Deadlines()
 
     @property
     def reply_timeout(self) -> float:
@@ -243,20 +245,23 @@ class Exchange(Connection, Generic[F]):
 
         ended = self._loop.create_future()
         wake = partial(release, ended)
-        timer = self._loop.call_at(until, wake)
+        self._deadlines.add(ended, until)
         for request in requests:
             request.wakers.append(wake)
 
         try:
             await ended
         finally:
-            timer.cancel()
+            self._deadlines.remove(ended)
             for request in requests:
                 if request.outcome is None:
                     request.wakers.remove(wake)
 
-        if not any(request.outcome for request in requests):
-            self._resync()
+        for request in requests:
+            if request.outcome:
+                return
+
+        self._resync()
 
     def _left(self, deadline: float) -> float:
         """The seconds until a deadline, 0 if it is over; the loop's timers may fire a moment early."""
@@ -308,12 +313,6 @@ class Exchange(Connection, Generic[F]):
     def _resync(self) -> None:
         """Give up a frame the rest of which is overdue."""
         raise NotImplementedError
-
-
-def release(ended: asyncio.Future[None]) -> None:
-    """End a waiting that may have ended already."""
-    if not ended.done():
-        ended.set_result(None)
 
 
 def ignore(_: object) -> None:

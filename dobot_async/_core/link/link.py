@@ -230,6 +230,7 @@ class Link(Exchange[F]):
     def _ended(self, error: ConnectionLost) -> None:
         """Tell everybody who waits."""
         self._correlator.fail(error)
+        self._deadlines.close()
         if self.state.value is LinkState.LOST:
             logger.warning("%s", error)
             self.on_lost(error)
@@ -255,6 +256,7 @@ class Link(Exchange[F]):
             self._note(False, frame)
             if not self._correlator.resolve(frame):
                 self._stats.unexpected += 1
+                self._stragglers.came(frame.key, self._arrived_at)
                 self.on_unsolicited(frame)
                 self.events.publish(Unexpected(frame))
 

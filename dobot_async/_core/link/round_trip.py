@@ -37,8 +37,8 @@ class RoundTrip:
     @property
     def timeout(self) -> float:
         """Seconds to wait for the next answer."""
-        base = INITIAL if self.smoothed is None else max(self.smoothed + max(4 * self._variation, GRAIN), self._floor)
-        return min(base * self._growth, self._ceiling)
+        base = INITIAL if self.smoothed is None else self.smoothed + max(4 * self._variation, GRAIN)
+        return min(max(base, self._floor) * self._growth, self._ceiling)
 
     def unanswered(self) -> None:
         """Take note that a timeout has passed."""

@@ -6,7 +6,7 @@ seconds after a loss a barrier is asked behind each request of that key: with on
 answer it is the right one (`Correlator`, held requests).
 
 That costs a second request each time, so it is done only where losses are rare: on a line that loses many messages a
-reply that does not come is lost.
+reply that does not come is lost. A loss whose reply comes after all was none.
 """
 
 from __future__ import annotations
@@ -40,12 +40,19 @@ class Stragglers:
         Args:
             key: Of the request.
             now: The time.
-            counts: False if there were several replies: the line has not lost anything then.
+            counts: False if there were several replies: one of them was that of a request that was lost before.
         """
         if counts:
             self._losses.append(self._sent)
+        else:
+            self.came(key, now)
 
         self._until[key] = now + SUSPICION
+
+    def came(self, key: Hashable, now: float) -> None:
+        """Note that a reply of a key came that nobody waits for: what was lost was not its request."""
+        if self._losses and now < self._until.get(key, -math.inf):
+            self._losses.pop()
 
     def suspected(self, key: Hashable, now: float) -> bool:
         """Return whether the reply to a request of a key has to be told from one that is late alone."""

@@ -8,10 +8,10 @@ from typing import Any, Protocol, TypeVar
 
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
-from dobot_async.errors import ArmAlarm, MotionUnknown
+from dobot_async.errors import ArmAlarm, DobotError, MotionUnknown, ReplyTimeout
 from dobot_async.wire import Command
 
-__all__ = ["Entry", "Executor", "Source", "alarmed"]
+__all__ = ["Entry", "Executor", "Source", "alarmed", "in_motions", "unseen"]
 
 Q = TypeVar("Q")
 
@@ -103,3 +103,21 @@ class Executor(Protocol):
 def alarmed(alarms: Sequence[object]) -> ArmAlarm:
     """What to raise because of alarms."""
     return ArmAlarm(f"the arm raised alarms: {'; '.join(map(str, alarms))}", alarms)
+
+
+def in_motions(error: ArmAlarm, motions: Sequence[object]) -> ArmAlarm:
+    """Say in which motion an alarm came up: the only one of several, or from the first to the last of them."""
+    if error.motions or not motions:
+        return error
+
+    first, last = motions[0], motions[-1]
+    where = f"{first}" if len(motions) == 1 else f"{first}{' or' if len(motions) == 2 else ' to'} {last}"
+    return ArmAlarm(f"{error}; in {where}", error.alarms, motions)
+
+
+def unseen(error: DobotError) -> DobotError:
+    """What an error means to Motions: an arm that does not answer may do them, or not."""
+    if isinstance(error, ReplyTimeout):
+        return MotionUnknown(f"the arm no longer answers, and what it does cannot be seen: {error}")
+
+    return error

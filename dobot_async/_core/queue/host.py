@@ -16,11 +16,11 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any, Protocol, TypeVar
 
-from dobot_async._core.queue.executor import Entry, Source
+from dobot_async._core.queue.executor import Entry, Source, unseen
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup, cancel_and_join
-from dobot_async.errors import ConnectionLost, DobotError, MotionUnknown, ReplyTimeout, another
+from dobot_async.errors import ConnectionLost, DobotError, MotionUnknown, another
 from dobot_async.wire import Command
 
 __all__ = ["HostExecutor", "HostQueue", "MotionRunner"]
@@ -63,11 +63,15 @@ class HostExecutor:
         runner: Does one command.
         cleanup: What still has to be done to the arm.
         capacity: How many commands may wait.
+
+    Attributes:
+        on_progress: Hooks, called when a command is done or has failed.
     """
 
     def __init__(self, runner: MotionRunner, cleanup: Cleanup, capacity: int = CAPACITY) -> None:
         self.cleanup = cleanup
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
+        self.on_progress: Hooks[[]] = Hooks()
         self._runner = runner
         self._capacity = capacity
         self._waiting: deque[tuple[int, Entry]] = deque()
@@ -180,11 +184,13 @@ class HostExecutor:
                 await self._runner.run(entry)
                 self._stands = True
                 self._finished = ticket
+                self.on_progress()
 
             self._worker = None
         except BaseException as error:
             if asyncio.current_task() is self._worker:  # else it was ended from here
                 self._error = told(error)
+                self.on_progress()
 
             if not isinstance(error, Exception):
                 raise
@@ -205,10 +211,10 @@ class HostExecutor:
 
 def told(error: BaseException) -> DobotError:
     """What those who wait hear of the end of the worker."""
-    if isinstance(error, ReplyTimeout):
-        return MotionUnknown(f"the arm no longer answers, and what it does cannot be seen: {error}")
+    if isinstance(error, DobotError):
+        return unseen(error)
 
-    return error if isinstance(error, DobotError) else MotionUnknown(f"the driver failed in a motion: {error!r}")
+    return MotionUnknown(f"the driver failed in a motion: {error!r}")
 
 
 class HostQueue(MotionQueue):
@@ -217,6 +223,7 @@ class HostQueue(MotionQueue):
     def __init__(self, executor: HostExecutor) -> None:
         super().__init__(executor)
         self._host = executor
+        executor.on_progress.add(self._poller.stir)
 
     @property
     def unsent(self) -> int:

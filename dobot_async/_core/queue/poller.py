@@ -1,4 +1,10 @@
-"""The poller: one task that asks the arm how far it is, while somebody wants to know."""
+"""The poller: one task that asks the arm how far it is, while somebody wants to know.
+
+- While the next motion cannot end yet: for the alarms now and then, and seldom for the index.
+- When it may end in a moment: for the index alone, as fast as it is answered. An answer to anything else would come
+  between the end and the answer that tells of it.
+- Where nothing tells when it ends: for the index, at intervals of 2 % of what the motion has taken so far.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +15,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Protocol
 
+from dobot_async._core.queue.executor import unseen
 from dobot_async._core.util.tasks import cancel_and_join
-from dobot_async.errors import DobotError, MotionUnknown, ReplyTimeout
+from dobot_async.errors import DobotError, MotionUnknown
 
-__all__ = ["DENSE", "POLL", "SELDOM", "StatusPoller"]
+__all__ = ["StatusPoller"]
 
 logger = logging.getLogger("dobot_async.queue")
-POLL = 0.003  # seconds between two looks at an arm of which nothing tells how long it still needs
-DENSE, SELDOM = 0.001, 0.05  # seconds from one look to the next, at the least and at the most
-ALARMS = 0.05  # seconds after which the alarms are read as well, for a motion that an alarm keeps from ending
+POLL = 0.003  # seconds between two looks, at the least, at an arm of which nothing tells how long it still needs
+SHARE, WIDEST = 0.02, 0.025  # of what its motion has taken so far, and seconds: the most
+LEAD = 0.002  # seconds before the earliest end, from when on the arm is asked as fast as it answers
+DENSE, SELDOM = 0.001, 0.25  # seconds from one question for the index to the next, at the least and at the most
+ALARMS = 0.2  # seconds after which the alarms are read as well, for a motion that an alarm keeps from ending
 UNWATCHED = 100  # Motions that may be pending although nobody awaits one; beyond, the arm is asked all the same
 
 
@@ -28,7 +37,11 @@ class Watched(Protocol):
     def pending(self) -> int:
         """How many accepted commands are not known to have ended."""
 
-    async def look(self, *, alarms: bool) -> None:
+    @property
+    def next(self) -> object:
+        """The Motion that ends next, None if there is none."""
+
+    async def look(self, *, alarms: bool, index: bool = True) -> None:
         """Ask the arm how far it is, and end the Motions that this decides."""
 
     async def rest(self) -> float | None:
@@ -84,24 +97,30 @@ class StatusPoller:
         return self._watchers > 0 or pending > UNWATCHED or (pending > 0 and self._clock() < self._until)
 
     async def _poll(self) -> None:
-        alarms_at = -math.inf
+        asked_at = alarms_at = near_since = -math.inf
+        head, since = None, self._clock()
         try:
             while self._wanted:
                 self._stirred.clear()
-                now, pause = self._clock(), POLL
-                alarms = now >= alarms_at + ALARMS
-                if alarms:
-                    alarms_at = now
+                now = self._clock()
+                if head is not self._queue.next:
+                    head, since = self._queue.next, now
 
+                pause = max(POLL, min(SHARE * (now - since), WIDEST))
                 try:
-                    await self._queue.look(alarms=alarms)
                     least = await self._queue.rest()
-                    pause = POLL if least is None else min(least / 2, SELDOM)
-                except ReplyTimeout as error:
-                    what = "the arm no longer answers, and what it does cannot be seen"
-                    self._queue.give_up(MotionUnknown(f"{what}: {error}"))
+                    near = least is not None and least <= LEAD
+                    near_since = near_since if near else now
+                    alarms = now >= alarms_at + ALARMS and not (near and now < near_since + ALARMS)
+                    index = least is None or near or now >= asked_at + min(max(POLL, (now - since) / 2), SELDOM)
+                    alarms_at, asked_at = now if alarms else alarms_at, now if index else asked_at
+                    if index or alarms:
+                        await self._queue.look(alarms=alarms, index=index)
+
+                    if least is not None:
+                        pause = min(now + least - LEAD, alarms_at + ALARMS) - self._clock()
                 except DobotError as error:
-                    self._queue.give_up(error)
+                    self._queue.give_up(unseen(error))
 
                 await self._rest(max(pause, now + DENSE - self._clock()))
         except Exception as error:

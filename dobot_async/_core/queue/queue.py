@@ -17,14 +17,15 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Coroutine, Sequence
-from contextlib import AbstractContextManager
-from typing import Any, TypeVar
+from collections.abc import Coroutine, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any, TypeVar, overload
 
-from dobot_async._core.queue.executor import Entry, Executor, alarmed
+from dobot_async._core.queue.executor import Entry, Executor, alarmed, in_motions, unseen
 from dobot_async._core.queue.motion import WITHDRAWN, Motion, Outbox
 from dobot_async._core.queue.poller import StatusPoller
 from dobot_async._core.queue.stopper import Stopper
+from dobot_async._core.queue.stream import Steps, Stream, StreamStep
 from dobot_async._core.queue.writer import Writer
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async._core.util.tasks import STAYING
@@ -42,6 +43,7 @@ from dobot_async.wire import Command
 __all__ = ["MotionQueue"]
 
 Q = TypeVar("Q")
+S = TypeVar("S", bound=StreamStep)
 logger = logging.getLogger("dobot_async.queue")
 
 
@@ -116,6 +118,34 @@ class MotionQueue:
         failed = next((motion for motion in motions if motion.index is None), None)
         if failed and (failure := failed.exception()):
             raise another(failure)
+
+    @overload
+    def stream(self, steps: Steps[Coroutine[Any, Any, Motion]]) -> Stream[Motion]: ...
+
+    @overload
+    def stream(self, steps: Steps[S]) -> Stream[S]: ...
+
+    def stream(self, steps: Steps[Any]) -> Stream[Any]:
+        """Queue steps as they come, as fast as the arm takes them; to be awaited, or iterated over as they are done.
+
+            await arm.queue.stream(arm.queue.path_to(x, y, 0) for x, y in points)
+            async for step in arm.queue.stream(program): ...
+
+        The steps queued belong to the queue: who cancels, or leaves the loop, ends the queueing of further ones.
+
+        Args:
+            steps: An iterable or async iterable of verbs of this queue, each not awaited yet, or of objects with a
+                `command` and its `value`. It is drawn from as there is room.
+
+        Returns:
+            What yields, in order, the Motion of each verb, or each object, once the arm has executed it.
+
+        Raises:
+            ValueError: A step does not fit; those before it go on.
+            DobotError: As `put` and the Motions do. A note, and `steps`, name the step that failed, or the first and
+                the last one that may have.
+        """
+        return Stream(self, steps)
 
     async def join(self, timeout: float | None = None) -> None:
         """Return when all that was put has been executed.
@@ -211,6 +241,9 @@ class MotionQueue:
         if isinstance(error, ConnectionLost):
             self.fail(error)
         else:
+            if isinstance(error, ArmAlarm):
+                error = in_motions(error, self._first_moving())
+
             logger.warning("%s; the arm is told to stop", error)
             self.begin_stop(error)
 
@@ -232,27 +265,35 @@ class MotionQueue:
         """Run work while nothing is sent; a stop ends it, and raises MotionStopped."""
         await self._writer.exclusively(work, what)
 
-    async def look(self, *, alarms: bool) -> None:
-        """Ask the arm how far it is, and end the Motions that this decides."""
+    @property
+    def next(self) -> Motion | None:
+        """The Motion that ends next, None if none is pending."""
+        return self._pending[0] if self._pending else None
+
+    async def look(self, *, alarms: bool, index: bool = True) -> None:
+        """Ask the arm how far it is, and end the Motions that this decides.
+
+        Args:
+            alarms: Read the alarms even if no Motion has ended.
+            index: False reads them alone.
+        """
         # What a stop ends the arm ticks off as it does what is done: nothing that is read while it goes on tells which.
-        stops = self._stopper.count
-        if self._stopper.under_way:
-            return
+        if not self._stopper.under_way:
+            with self._unless_stopped():
+                await self._look(self._stopper.count, alarms=alarms, index=index)
 
-        try:
-            await self._look(stops, alarms=alarms)
-        except (MotionUnknown, ReplyTimeout):
-            if self._stopper.count == stops:
-                raise
-
-    async def _look(self, stops: int, *, alarms: bool) -> None:
-        ticket = await self._executor.completed()
+    async def _look(self, stops: int, *, alarms: bool, index: bool) -> None:
+        ticket = await self._executor.completed() if index else None
         reached = [motion for motion in self._pending if ticket is not None and (motion.index or 0) <= ticket]
         if self._stopper.count != stops or not (reached or alarms):
             return
 
         blocking = await self._executor.alarms()
         if self._stopper.count != stops:
+            return
+
+        if blocking and not index:
+            await self._look(stops, alarms=True, index=True)  # first, which of them was done
             return
 
         for motion in reached:
@@ -263,22 +304,28 @@ class MotionQueue:
             # The arm ticks off a motion that fails as it does one that succeeds. Of several that it has ticked off
             # since the alarms were last clear the last one failed; another one is done if the arm stands at its target.
             failed = [motion for motion in reached if motion.moves and not motion.ended]
-            self.begin_stop(alarmed(blocking), doubtful=failed[:-1])
+            suspects = failed or self._first_moving()
+            self.begin_stop(in_motions(alarmed(blocking), suspects), doubtful=failed[:-1])
 
         self._prune()
 
     async def rest(self) -> float | None:
         """Return seconds within which no Motion can end; None where nothing tells."""
-        if self._stopper.under_way or not self._pending:
-            return None
+        if not self._stopper.under_way and self._pending:
+            with self._unless_stopped():
+                return await self._executor.earliest_end(self._pending[0].entry)
 
-        return await self._executor.earliest_end(self._pending[0].entry)
+        return None
 
     async def no_more_room(self, error: ArmAlarm) -> None:
         """The arm has no room, and makes none, because of alarms."""
-        await self.update()  # which tells the motions that were done from those that were not
+        try:
+            await self.update()  # which tells the motions that were done from those that were not
+        except DobotError as failure:
+            self.give_up(unseen(failure))
+
         if not self._stopper.under_way:
-            self.begin_stop(error)
+            self.begin_stop(in_motions(error, self._first_moving()))
 
     def cancel_writer(self) -> None:
         """End what is being sent."""
@@ -299,6 +346,20 @@ class MotionQueue:
         stop = self.begin_stop(error, halt=halt)
         self._failure = None  # whoever stops an arm knows that it was stopped
         await self._stopper.wait(stop, timeout)
+
+    def _first_moving(self) -> Sequence[Motion]:
+        """The first motion that is not known to be done, if there is one."""
+        return [motion for motion in self._pending if motion.moves and not motion.ended][:1]
+
+    @contextmanager
+    def _unless_stopped(self) -> Iterator[None]:
+        """What goes wrong in this block is of no interest if a stop has begun meanwhile."""
+        stops = self._stopper.count
+        try:
+            yield
+        except (MotionUnknown, ReplyTimeout):
+            if self._stopper.count == stops:
+                raise
 
     def _prune(self) -> None:
         while self._pending and self._pending[0].ended:

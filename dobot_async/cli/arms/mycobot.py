@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractAsyncContextManager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 import click
 
-from dobot_async.cli.family import Family, Told
+from dobot_async.cli.family import Family, Pieces, Told
 from dobot_async.cli.output import plain
-from dobot_async.cli.pieces import cobot_pieces
+from dobot_async.cli.trace import REPLY, REQUEST
 from dobot_async.errors import ProtocolError
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.alarms import CobotAlarm
 from dobot_async.mycobot.arm import MyCobot
-from dobot_async.mycobot.frame import Frame
+from dobot_async.mycobot.frame import Frame, Parser
 from dobot_async.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
-from dobot_async.mycobot.readings import CobotPose
+from dobot_async.mycobot.pose import CobotPose
 
 __all__ = ["COBOTS"]
 
 WAYS = {"to": c.MoveMode.ANGULAR, "linear": c.MoveMode.LINEAR}
 JOINTS = "joints"
+HEADER = b"\xfe\xfe"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ def joint_words(pose: CobotPose) -> str:
 
 async def info(arm: MyCobot) -> Told:
     """The model, and the versions of its firmware."""
-    found = await arm.get_info()
+    found = await arm.get_versions()
     versions = [each or "unknown" for each in (found.system_version, found.basic_version)]
     return Told(found, f"model          {found.model}\nfirmware       {versions[0]}\nM5             {versions[1]}")
 
@@ -85,8 +86,10 @@ async def read(arm: MyCobot) -> CobotReading:
 async def move(arm: MyCobot, numbers: Sequence[float], mode: str) -> None:
     """One number for each joint, or each coordinate."""
     if mode == JOINTS:
+        arm.model.check(c.SEND_ANGLES, c.JointsMove(tuple(numbers), 1))  # in the words of who typed them
         await arm.move_joints(*numbers)
     else:
+        arm.model.check(c.SEND_COORDS, c.ToMove(tuple(numbers), 1, WAYS[mode]))
         x, y, z, *rotation = numbers
         await arm.move_to(x, y, z, *rotation, mode=WAYS[mode])
 
@@ -121,6 +124,43 @@ def describe(model: CobotModel) -> Callable[..., Mapping[str, Any]]:
         return line
 
     return described
+
+
+def cobot_pieces(model: CobotModel) -> Pieces:
+    """What finds the pieces of a myCobot's bytes; which frames there are depends on the model."""
+
+    def pieces(data: bytes) -> Iterator[dict[str, Any]]:
+        parser = Parser(model.known)
+        at = 0
+        for frame in [*parser.feed(data), *parser.resync()]:
+            start = data.index(bytes(frame), at)
+            yield from cobot_junk(data, at, start)
+            yield {"offset": start, **described_cobot(model, frame)}
+            at = start + len(bytes(frame))
+
+        yield from cobot_junk(data, at, len(data))
+
+    return pieces
+
+
+def cobot_junk(data: bytes, at: int, end: int) -> Iterator[dict[str, Any]]:
+    """Yields the junk in a range as one piece."""
+    junk = data[at:end]
+    if junk:
+        reason = "incomplete, or its length, its footer and its command do not agree" if HEADER in junk else "no header"
+        yield {"offset": at, "raw": junk, "junk": reason}
+
+
+def described_cobot(model: CobotModel, frame: Frame) -> dict[str, Any]:
+    """What is to be said of a frame; "request" and "reply" are there if it can be one."""
+    row = model.row(model.by_id[frame.id])
+    piece = {"raw": bytes(frame), "id": frame.id, "write": row.write, "command": row.name, "section": row.section}
+    for role, layout in ((REQUEST, row.request), (REPLY, row.reply)):
+        with suppress(ProtocolError):
+            if len(frame.params) in getattr(layout, "lengths", {0}):
+                piece[role] = plain(layout.decode(frame.params))
+
+    return piece
 
 
 def of_model(name: str) -> type[MyCobot]:

@@ -1,0 +1,158 @@
+"""How late the end of each kind of command is noticed, and what that costs in requests, in virtual time.
+
+    python benchmarks/bench_lateness.py [--motions 60] [--json] [--quick]
+
+The line carries 115,200 baud each way and loses nothing; neither program takes any time of its own. So the figures are
+those of the schedule of questions alone, and the same in every run and on every computer. `floor_ms` is what a client
+that asks one question after the other cannot beat at the median: half of a round trip for the index, then the answer
+that tells of the end, then the alarms.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import sys
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import SplitResult
+
+import async_solipsism
+from report import BAUD, BITS, Row, parsed, percentile, show
+
+from dobot_async import Magician, MyCobot, PTPMode, UltraArm
+from dobot_async.simulator import simulate
+from dobot_async.transports import SCHEMES, Transport, open_transport
+
+INDEX, ALARMS = (6, 14), (6, 22)  # bytes of question and answer
+FLOOR = (sum(INDEX) / 2 + INDEX[1] + sum(ALARMS)) * BITS / BAUD
+SEED = 1
+Go = Callable[[Any, random.Random], Awaitable[None]]
+
+
+class SlowLine:
+    """A line in memory that takes its time for each byte; each direction has its own."""
+
+    window = 16
+    in_flight = 8
+    reorder_window = 0.0
+
+    def __init__(self, inner: Transport) -> None:
+        self._inner = inner
+        self._loop = asyncio.get_running_loop()
+        self._out = self._in = 0.0
+        self._arrived: asyncio.Queue[bytes | Exception] = asyncio.Queue()
+        self._tasks = {asyncio.create_task(self._read())}
+
+    def write(self, data: bytes) -> bool:
+        """Take a frame; it reaches the arm once its last byte has gone out."""
+        self._out = max(self._out, self._loop.time()) + len(data) * BITS / BAUD
+        self._loop.call_at(self._out, self._reach, data)
+        return True
+
+    async def send(self, data: bytes) -> None:
+        """As `write`."""
+        self.write(data)
+
+    async def receive(self) -> bytes:
+        """Return what has come in whole."""
+        found = await self._arrived.get()
+        if isinstance(found, Exception):
+            raise found
+
+        return found
+
+    async def aclose(self) -> None:
+        """Close it."""
+        await self._inner.aclose()
+        await asyncio.wait(self._tasks)
+
+    def _reach(self, data: bytes) -> None:
+        task = asyncio.create_task(self._inner.send(data))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _read(self) -> None:
+        try:
+            while True:
+                data = await self._inner.receive()
+                self._in = max(self._in, self._loop.time()) + len(data) * BITS / BAUD
+                self._loop.call_at(self._in, self._arrived.put_nowait, data)
+        except Exception as error:  # noqa: BLE001 - whoever receives is told
+            self._arrived.put_nowait(error)
+
+
+async def open_url(url: SplitResult, *, arm: str) -> Transport:
+    """Open `slow://HOST`: `sim://HOST` over a slow line."""
+    return SlowLine(await open_transport(f"sim://{url.netloc}", arm=arm))
+
+
+SCHEMES["slow"] = (Path(__file__).stem, "slow://HOST")
+
+
+def place(rng: random.Random) -> tuple[float, float, float]:
+    """Somewhere within reach."""
+    return rng.uniform(180, 240), rng.uniform(-100, 100), rng.uniform(0, 60)
+
+
+async def very_slowly(arm: Magician, rng: random.Random) -> None:
+    """A motion of many seconds."""
+    await arm.set_speed(4)
+    await arm.move_to(*place(rng), mode=PTPMode.MOVL_XYZ)
+
+
+KINDS: dict[str, tuple[str, Any, Go]] = {
+    "MOVL": ("magician", Magician, lambda arm, rng: arm.move_to(*place(rng), mode=PTPMode.MOVL_XYZ)),
+    "MOVJ": ("magician", Magician, lambda arm, rng: arm.move_to(*place(rng))),
+    "MOVL, slow": ("magician", Magician, very_slowly),
+    "JUMP": ("magician", Magician, lambda arm, rng: arm.move_to(*place(rng), mode=PTPMode.JUMP_XYZ)),
+    "increment": ("magician", Magician, lambda arm, rng: arm.move_by(z=rng.choice((-1, 1)) * rng.uniform(3, 9))),
+    "wait": ("magician", Magician, lambda arm, rng: arm.wait(rng.uniform(0.02, 3.0))),
+    "myCobot 280": (
+        "mycobot280",
+        MyCobot,
+        lambda arm, rng: arm.move_joints(*(rng.uniform(-60, 60) for _ in range(6))),
+    ),
+    "ultraArm": ("ultraarm", UltraArm, lambda arm, rng: arm.move_joints(*(rng.uniform(0, 60) for _ in range(3)))),
+}
+
+
+async def measured(kind: str, motions: int) -> Row:
+    """How late the ends of some commands of one kind are noticed."""
+    model, family, go = KINDS[kind]
+    loop, rng = asyncio.get_running_loop(), random.Random(SEED)
+    began = loop.time()
+    late, took = [], 0.0
+    async with simulate(model) as sim, family.connect(sim.url.replace("sim://", "slow://")) as arm:
+        sent = arm.link.stats.sent
+        for _ in range(motions):
+            before = loop.time()
+            await go(arm, rng)
+            took += loop.time() - before
+            late.append(loop.time() - began - sim.arm.executed[-1].finished)
+
+        return {
+            "kind": kind,
+            "floor_ms": round(FLOOR * 1000, 2) if family is Magician else None,
+            "late_p50_ms": round(percentile(late, 50) * 1000, 2),
+            "late_worst_ms": round(max(late) * 1000, 2),
+            "requests": round((arm.link.stats.sent - sent) / motions, 1),
+            "seconds": round(took / motions, 2),
+        }
+
+
+def main() -> None:
+    """Prints a table, or one JSON object."""
+    options = parsed(__doc__, motions=60)
+    sys.modules[Path(__file__).stem] = sys.modules["__main__"]  # where the scheme is looked for
+    rows = []
+    for kind in KINDS:
+        with asyncio.Runner(loop_factory=async_solipsism.EventLoop) as runner:
+            rows.append(runner.run(measured(kind, options.motions)))
+
+    show("lateness", rows, as_json=options.json, motions=options.motions)
+
+
+if __name__ == "__main__":
+    main()
