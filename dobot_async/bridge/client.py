@@ -82,6 +82,7 @@ class Client(Generic[F]):
         self._bytes = Allowance(limits.data, self._loop.time)
         self._frames = Allowance(limits.frames, self._loop.time)
         self._room = asyncio.Semaphore(AT_ONCE)
+        self._order = asyncio.Lock()
         self._news = asyncio.Event()
         self._held = False
         self._junk = 0
@@ -131,11 +132,27 @@ class Client(Generic[F]):
         self.gone = self.left = True
         self._work.cancel()
 
+    async def take_turn(self, request: Request[F]) -> None:
+        """Waits until what the client has asked before is on the arm's line.
+
+        The arm answers in order, and so the client is answered: it takes an answer that comes in front of another one
+        for the proof that the other one was lost.
+        """
+        await self._order.acquire()
+        request.in_turn = True
+
+    def end_turn(self, request: Request[F]) -> None:
+        """A request is sent now, or will never be; may be called again."""
+        if request.in_turn:
+            request.in_turn = False
+            self._order.release()
+
     def sending(self, request: Request[F]) -> None:
         """A read is sent now: what is repeated from here on is asked anew."""
         if self.gone:
             raise Refused("the client has gone")
 
+        self.end_turn(request)
         self._forget(request)
 
     async def settled(self) -> None:
@@ -215,13 +232,13 @@ class Client(Generic[F]):
                 self._take(request)
 
     def _ask(self, request: Request[F]) -> None:
-        """Lets a read wait, or joins it with the last one of its key if that is the same and waits as well."""
+        """Lets a read wait, or joins it with the one before it if that is the same and waits as well."""
         last = self._unsent.get(request.frame.key)
         if last and last.frame == request.frame and last.times < MOST_TIMES:
             last.times += 1
             self._frames.spend(1)
         else:
-            self._unsent[request.frame.key] = request
+            self._unsent = {request.frame.key: request}
             self._take(request)
 
     def _take(self, request: Request[F]) -> None:

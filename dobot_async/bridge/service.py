@@ -228,9 +228,15 @@ class Bridge(Generic[F]):
         if request.kind is Kind.OFF:
             return await self._urge(client, frame)
 
-        if request.kind is Kind.WRITE:
-            return await self._write(client, request)
+        await client.take_turn(request)
+        try:
+            return await (self._write if request.kind is Kind.WRITE else self._read)(client, request)
+        finally:
+            client.end_turn(request)
 
+    async def _read(self, client: Client[F], request: Request[F]) -> F:
+        """Passes on what changes nothing."""
+        frame = request.frame
         if not client.reads.try_acquire(frame.key, Priority.IMMEDIATE):
             await client.reads.acquire(frame.key, Priority.IMMEDIATE)
 
@@ -267,6 +273,7 @@ class Bridge(Generic[F]):
             if request.stops != self.stops:
                 raise Refused("the arm was stopped before it was sent")
 
+            client.end_turn(request)
             client.watch.sent(frame)
 
         reply = await self._line.ask(frame, ready=ready)

@@ -313,6 +313,28 @@ async def test_a_stop_overtakes_and_drops_what_waits() -> None:
         assert len(rig.told("refused")) == 1
 
 
+async def test_a_client_is_answered_in_order_however_many_others_ask_the_same() -> None:
+    asked = [ask(c.GET_POSE), ask(c.GET_PTP_COMMON_PARAMS), ask(c.GET_POSE), ask(c.GET_DEVICE_NAME), set_now(50)]
+    async with bridged() as rig, client(rig.url) as one, AsyncExitStack() as stack:
+        rig.sim.faults.latency = 0.005
+        others = [await stack.enter_async_context(client(rig.url)) for _ in range(5)]
+
+        async def read(other: Plain) -> None:
+            while True:
+                await other.ask(c.GET_POSE)
+
+        reading = [asyncio.create_task(read(other)) for other in others]
+        try:
+            for _ in range(5):
+                await one.send(*asked)
+                assert [(await one.receive()).id for _ in asked] == [each.id for each in asked]
+        finally:
+            for task in reading:
+                task.cancel()
+
+            await asyncio.wait(reading)
+
+
 async def test_anybody_may_switch_off_what_burns_and_drops_nothing_of_the_mover() -> None:
     laser, motors = c.EndEffectorLaser(True, True), [c.EMotor(index, False, 0) for index in (0, 1)]
     async with bridged(speed=1.0) as rig, client(rig.url) as mover, client(rig.url) as other:
