@@ -45,7 +45,7 @@ test-minimum: .venv-minimum/.dev
 .venv-minimum/.dev: pyproject.toml
 	$(PYTHON) -m venv --clear .venv-minimum
 	.venv-minimum/bin/python -m pip install --quiet --disable-pip-version-check uv
-	.venv-minimum/bin/uv pip install --quiet --python .venv-minimum/bin/python --resolution lowest-direct --editable '.[dev]'
+	.venv-minimum/bin/uv pip install --quiet --python .venv-minimum/bin/python --resolution lowest-direct --editable '.[dev,fuzz]'
 	touch $@
 
 pytest: $(VENV)/.dev

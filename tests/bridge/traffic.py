@@ -16,7 +16,7 @@ import time
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from dobot_async import Magician, MyCobot, UltraArm
 from dobot_async.bridge import bridge
 from dobot_async.errors import ConnectFailed, ConnectionLost, DobotError
 from dobot_async.simulator import Simulation, simulate
+from dobot_async.simulator.magician_body import MAGICIAN
 
 __all__ = ["FAMILIES", "Figures", "Programs", "bare", "through_a_bridge"]
 
@@ -208,7 +209,10 @@ async def measure(name: str, way: Any, arguments: argparse.Namespace) -> Total:
     """Runs one way for the whole time."""
     total = Total()
     async with AsyncExitStack() as stack:
-        sim = await stack.enter_async_context(simulate(arguments.family, listen="tcp://127.0.0.1:0", seed=5, speed=20))
+        details: dict[str, Any] = {"options": replace(MAGICIAN, keep=100)} if arguments.family == "magician" else {}
+        sim = await stack.enter_async_context(
+            simulate(arguments.family, listen="tcp://127.0.0.1:0", seed=5, speed=20, **details)
+        )
         sim.faults.latency = 0.002
         programs: Programs = await stack.enter_async_context(way(sim))
         figures = programs.figures
