@@ -103,7 +103,7 @@ class WebSocketConnection(PendingConnection):
             response = self._socket.accept(request)
             self._socket.send_response(response)
             if response.status_code != HTTPStatus.SWITCHING_PROTOCOLS:
-                self._flush()
+                self._written()
                 self.turn_away("a request for something else than a WebSocket")
                 return
 
@@ -115,7 +115,7 @@ class WebSocketConnection(PendingConnection):
 
     def _refuse(self, status: HTTPStatus, told: str, reason: str) -> None:
         self._socket.send_response(self._socket.reject(status, told))
-        self._flush()
+        self._written()
         self.turn_away(reason)
 
     def _frame(self, frame: Any) -> None:
