@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import Any
 
 HOMES = {
+    "arms.base": ("Arm",),
     "arms.info": ("DeviceInfo",),
     "contract": ("LinkState", "LinkStats", "Unexpected"),
     "discovery": ("DiscoveryProblem", "Found", "discover"),

@@ -2,6 +2,7 @@
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.queue.motion import Motion
+from dobot_async.arms.base import Arm
 from dobot_async.arms.info import DeviceInfo
 from dobot_async.contract import LinkState, LinkStats, Unexpected
 from dobot_async.discovery import DiscoveryProblem, Found, discover
@@ -49,6 +50,7 @@ from dobot_async.wire import Command
 __all__ = [
     "AccessoryVersion",
     "Alarm",
+    "Arm",
     "ArmAlarm",
     "CobotAlarm",
     "CobotInfo",

@@ -35,6 +35,7 @@ class Family:
         models: Its words beside its name: models that are chosen as an arm is.
         public: The names that it adds to the package, by the modules that they are in.
         simulator: Makes a simulated arm, from a clock.
+        scene: A `dobot_async.simulator.scene.SceneArm`, from a simulated arm.
         bridge: A `dobot_async.bridged.Bridged`.
         discovery: A `dobot_async.discovery.families.Family`.
         cli: A `dobot_async.cli.family.Family`.
@@ -45,6 +46,7 @@ class Family:
     models: tuple[str, ...] = ()
     public: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     simulator: str = ""
+    scene: str = ""
     bridge: str = ""
     discovery: str = ""
     cli: str = ""

@@ -152,6 +152,20 @@ def check_ultraarm_gcode(output: str) -> None:
     assert numbers(last) == [200, -20, 60]
 
 
+def check_color_sorter(output: str) -> None:
+    """An arm without anything around it finds nothing to sort; the rest is tested in a scene."""
+    assert output == ""
+
+
+def check_rail_pick_and_place(output: str) -> None:
+    assert [numbers(line) for line in output.splitlines()] == [[number, 700] for number in (1, 2, 3)]
+
+
+def check_svg_drawing(output: str) -> None:
+    """The heart: four curves of 24 points each, its beginning and its end; and a line."""
+    assert [numbers(line) for line in output.splitlines()] == [[98], [2]]
+
+
 CHECKS: dict[str, Callable[[str], None]] = {
     "connect_and_read.py": check_connect_and_read,
     "pick_and_place.py": check_pick_and_place,
@@ -168,6 +182,9 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "zenoh_two_processes.py": check_zenoh_two_processes,
     "mycobot_pick.py": check_mycobot_pick,
     "ultraarm_gcode.py": check_ultraarm_gcode,
+    "color_sorter.py": check_color_sorter,
+    "rail_pick_and_place.py": check_rail_pick_and_place,
+    "svg_drawing.py": check_svg_drawing,
 }
 
 

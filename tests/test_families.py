@@ -15,7 +15,7 @@ from dobot_async.families import REGISTERED, Each, Parts, families, homes
 from dobot_async.mycobot.models import MODELS
 
 PAGE = Path(__file__).parents[1] / "docs" / "adding-a-family.md"
-PARTS = ("simulator", "bridge", "discovery", "cli", "fleet", "program")
+PARTS = ("simulator", "scene", "bridge", "discovery", "cli", "fleet", "program")
 
 PROGRAM = """
 from dobot_async.cli.family import Family as Shown, Told

@@ -14,6 +14,7 @@ import dobot_async
 NAMES = [
     "AccessoryVersion",
     "Alarm",
+    "Arm",
     "ArmAlarm",
     "CobotAlarm",
     "CobotInfo",

@@ -49,6 +49,78 @@ async def test_both(simulated_arm, faulty_arm):
     assert simulated_arm.url != faulty_arm.url
 """
 
+SCENE_SUITE = """
+import pytest
+from dobot_async import Magician, MyCobot, UltraArm
+from dobot_async.simulator.scene import Mount, Piece, Scene
+
+pytestmark = [pytest.mark.asyncio, pytest.mark.dobot(dup=0)]
+
+@pytest.fixture
+def dobot_scene():
+    return Scene(pieces=[Piece("red", (250, 0), color="red")])
+
+async def carry(url):
+    async with Magician.connect(url) as arm:
+        await arm.home()
+        for (x, y), on in (((250, 0), True), ((200, 100), False)):
+            await arm.move_to(x, y, 20)
+            await arm.move_to(x, y, -53.5)
+            await arm.suction(on)
+            await arm.wait(0.3)
+            await arm.move_to(x, y, 20)
+
+async def test_a_piece_is_carried(simulated_arm, dobot_scene):
+    assert simulated_arm.scene is dobot_scene
+    await carry(simulated_arm.url)
+    assert dobot_scene.pieces["red"].position == pytest.approx((200, 100, -138), abs=0.1)
+
+@pytest.mark.parametrize("line", ["good", "wifi", "ble", "cable"])
+async def test_on_any_line(request, simulate_arm, dobot_scene, line):
+    sim = await simulate_arm(line=None if line == "good" else line)
+    assert sim.faults.any == (line != "good")
+    await carry(sim.url)
+    assert dobot_scene.pieces["red"].position == pytest.approx((200, 100, -138), abs=0.1)
+
+@pytest.mark.dobot(mount=Mount(x=50, name="left"))
+async def test_two_arms(simulated_arm, simulate_arm, dobot_scene):
+    right = await simulate_arm("ultraarm", mount=Mount(x=500, yaw=180, name="right"))
+    async with Magician.connect(simulated_arm.url) as one, UltraArm.connect(right.url) as other:
+        await other.home()
+        await one.home()
+        await one.move_to(200, 0, 0)
+        await one.move_to(200, 0, -53.5)
+        await one.suction(True)
+        await one.wait(0.3)
+        assert dobot_scene.pieces["red"].on == "tool of left"
+    assert right.scene is dobot_scene
+"""
+FAMILIES_SUITE = """
+import pytest
+from dobot_async import MyCobot, UltraArm
+
+pytestmark = pytest.mark.asyncio
+
+@pytest.mark.dobot(model="mycobot280", line="wifi")
+async def test_a_cobot(simulated_arm):
+    assert simulated_arm.faults.stall and not simulated_arm.faults.jitter
+    async with MyCobot.connect(simulated_arm.url, model="mycobot280") as arm:
+        await arm.move_joints(10, -20, 30, 0, 0, 0)
+    assert simulated_arm.arm.joints[:3] == pytest.approx((10, -20, 30), abs=0.5)
+
+@pytest.mark.dobot(model="ultraarm", loss=0)
+async def test_an_ultraarm(faulty_arm):
+    assert faulty_arm.faults.latency and not faulty_arm.faults.loss
+    async with UltraArm.connect(faulty_arm.url) as arm:
+        await arm.home()
+        await arm.move_joints(10, 20, 30)
+    assert faulty_arm.arm.angles.j1 == pytest.approx(10, abs=0.1)
+
+async def test_all(simulate_arm):
+    arms = [await simulate_arm(model) for model in ("magician", "myarm300", "ultraarm")]
+    assert len({each.url for each in arms}) == 3
+"""
+
 
 def run(directory: Path, suite: str, *options: str) -> subprocess.CompletedProcess[str]:
     """Runs a test suite as a user does, away from the settings of this one."""
@@ -71,6 +143,14 @@ def passed(ran: subprocess.CompletedProcess[str]) -> int:
 @pytest.mark.parametrize("mode", ["auto", "strict"])
 def test_both_modes_of_pytest_asyncio(tmp_path: Path, mode: str) -> None:
     assert passed(run(tmp_path, SUITE, "--asyncio-mode", mode)) == 4
+
+
+def test_arms_stand_in_the_scene_of_the_suite(tmp_path: Path) -> None:
+    assert passed(run(tmp_path, SCENE_SUITE)) == 6
+
+
+def test_all_families_are_served(tmp_path: Path) -> None:
+    assert passed(run(tmp_path, FAMILIES_SUITE)) == 3
 
 
 def test_auto_mode_needs_no_mark(tmp_path: Path) -> None:
@@ -106,12 +186,24 @@ async def test_without_a_name(simulated_arm): pass
 
 @pytest.mark.dobot(loss=2)
 async def test_no_probability(simulated_arm): pass
+
+@pytest.mark.dobot(line="wlan")
+async def test_no_line(simulated_arm): pass
+
+@pytest.mark.dobot(mount=None)
+async def test_a_mount_without_a_scene(simulated_arm): pass
+
+async def test_a_misspelt_setting(simulate_arm):
+    await simulate_arm(spede=2)
 """
     ran = run(tmp_path, suite, "--asyncio-mode", "auto")
-    assert "3 errors in" in ran.stdout
+    assert "1 failed, 5 errors in" in ran.stdout
     assert "@pytest.mark.dobot takes no spede; it is dobot(listen=" in ran.stdout
     assert "@pytest.mark.dobot takes no 50; it is dobot(listen=" in ran.stdout
     assert "loss is a probability, 0 to 1, not 2" in ran.stdout
+    assert "there is no line 'wlan'; there are: bad, wifi, ble, cable" in ran.stdout
+    assert "have a fixture dobot_scene that returns one" in ran.stdout
+    assert "simulate_arm takes no spede; it is dobot(listen=" in ran.stdout
 
 
 def test_the_seed_is_the_tests_own_and_told_when_it_fails(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ FAMILY = Family(
         ),
     },
     simulator="dobot_async.simulator.magician:SimulatedMagician",
+    scene="dobot_async.simulator.scene.magician:MagicianInScene",
     bridge="dobot_async.magician.bridged:BRIDGED",
     discovery="dobot_async.discovery.families:MAGICIAN",
     cli="dobot_async.cli.arms.magician:MAGICIAN",

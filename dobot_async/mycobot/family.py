@@ -17,6 +17,7 @@ FAMILY = Family(
         "dobot_async.mycobot.readings": ("CobotInfo",),
     },
     simulator="dobot_async.simulator.mycobot:SIMULATED",
+    scene="dobot_async.simulator.scene.mycobot:MyCobotInScene",
     bridge="dobot_async.mycobot.bridged:BRIDGED",
     discovery="dobot_async.discovery.families:MYCOBOT",
     cli="dobot_async.cli.arms.mycobot:COBOTS",

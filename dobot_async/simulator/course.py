@@ -130,6 +130,19 @@ class Course:
         """Whether alarms hold motions back."""
         return self._options.on_fault == "halt" and not self.alarms <= self._options.harmless
 
+    @property
+    def busy(self) -> bool:
+        """Whether a step is being taken, so that `run` does nothing."""
+        return self._busy
+
+    @property
+    def due(self) -> float:
+        """When the next thing happens by itself; infinity if nothing does."""
+        if self.frozen_at is not None:
+            return math.inf
+
+        return min((active.due for active in self.active), default=math.inf)
+
     def boot(self) -> None:
         """Makes the state that of an arm after power-up; what goes on has been ended before."""
         self.queue.clear()

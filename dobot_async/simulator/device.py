@@ -11,11 +11,19 @@ follows that a change of anything that a Work reads in `begin` must be preceded 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
+from typing import Protocol
 
 from dobot_async.simulator.course import Course
 from dobot_async.simulator.work import NO_INDEX, Activity, DeviceOptions, Executed, Fault, Outcome, Vector, Work
 
-__all__ = ["Activity", "Device", "DeviceOptions", "Executed", "Fault", "Outcome", "Vector", "Work"]
+__all__ = ["Activity", "Device", "DeviceOptions", "Executed", "Fault", "Outcome", "Surroundings", "Vector", "Work"]
+
+
+class Surroundings(Protocol):
+    """What a device stands in, with others."""
+
+    def advance(self, until: float) -> None:
+        """Brings all of them up to a time, by `Device.run`."""
 
 
 class Device:
@@ -25,6 +33,7 @@ class Device:
         options: What it was made with.
         accepted: How many commands the queue has taken so far.
         on_finish: Called with each record; it may call the device.
+        scene: What it stands in, if anything: it brings up all of its arms together.
     """
 
     def __init__(
@@ -37,6 +46,7 @@ class Device:
         self.options = options or DeviceOptions()
         self.accepted = 0
         self.on_finish = on_finish
+        self.scene: Surroundings | None = None
         self._clock = clock
         self._inputs: dict[Hashable, float] = {}
         self._garbage_reads = 0
@@ -47,7 +57,19 @@ class Device:
 
     def advance(self) -> None:
         """Brings everything up to the clock."""
-        self._course.run(self._clock())
+        if self.scene is None:
+            self._course.run(self._clock())
+        elif not self._course.busy:
+            self.scene.advance(self._clock())
+
+    def run(self, until: float) -> None:
+        """Brings this device alone up to a time; for what it stands in."""
+        self._course.run(until)
+
+    @property
+    def due(self) -> float:
+        """When the next thing happens by itself; infinity if nothing does."""
+        return self._course.due
 
     # What can be read of it.
 

@@ -26,6 +26,7 @@ import anyio
 from dobot_async.errors import ConnectFailed
 from dobot_async.families import Parts
 from dobot_async.simulator.faults import MEANS, PROBABILITIES, TIMES, Channel, Faults, LineState
+from dobot_async.simulator.scene import Mount, Scene
 from dobot_async.transports.base import MANY, Option, Transport, options
 from dobot_async.transports.baud import AtBaud
 from dobot_async.transports.listen import on_tcp, on_udp
@@ -95,16 +96,25 @@ class Simulation(Generic[A]):
         outages: When a stall or a silence that was drawn began on a line, and when it ends, in the loop's seconds.
     """
 
-    def __init__(self, arm: A, faults: Faults, seed: int | None) -> None:
+    def __init__(self, arm: A, faults: Faults, seed: int | None, scene: Scene | None = None) -> None:
         self.url = ""
         self.arm = arm
         self.faults = faults
         self.environment: dict[str, str] = {}
         self.outages: list[tuple[float, float]] = []
+        self._scene = scene
         self._random = Random(seed)  # noqa: S311 - repeatable faults, no secrets
         self._clients: dict[Client, None] = {}
         self._departed: list[Client] = []
         self._ended = False
+
+    @property
+    def scene(self) -> Scene:
+        """What the arm stands in; raises RuntimeError if it was simulated without one."""
+        if self._scene is None:
+            raise RuntimeError("this arm stands in no scene: simulate(..., scene=Scene(...)) gives it one")
+
+        return self._scene
 
     def client(
         self,
@@ -240,6 +250,8 @@ def simulate(
     seed: int | None = ...,
     faults: Faults | None = ...,
     clock: Callable[[], float] | None = ...,
+    scene: Scene | None = ...,
+    mount: Mount | None = ...,
     **details: Any,
 ) -> AbstractAsyncContextManager[Simulation[SimulatedMagician]]: ...
 @overload
@@ -251,6 +263,8 @@ def simulate(
     seed: int | None = ...,
     faults: Faults | None = ...,
     clock: Callable[[], float] | None = ...,
+    scene: Scene | None = ...,
+    mount: Mount | None = ...,
     **details: Any,
 ) -> AbstractAsyncContextManager[Simulation[SimulatedMyCobot]]: ...
 @overload
@@ -262,6 +276,8 @@ def simulate(
     seed: int | None = ...,
     faults: Faults | None = ...,
     clock: Callable[[], float] | None = ...,
+    scene: Scene | None = ...,
+    mount: Mount | None = ...,
     **details: Any,
 ) -> AbstractAsyncContextManager[Simulation[SimulatedUltraArm]]: ...
 @overload
@@ -273,6 +289,8 @@ def simulate(
     seed: int | None = ...,
     faults: Faults | None = ...,
     clock: Callable[[], float] | None = ...,
+    scene: Scene | None = ...,
+    mount: Mount | None = ...,
     **details: Any,
 ) -> AbstractAsyncContextManager[Simulation[Any]]: ...
 
@@ -286,6 +304,8 @@ async def simulate(
     seed: int | None = None,
     faults: Faults | None = None,
     clock: Callable[[], float] | None = None,
+    scene: Scene | None = None,
+    mount: Mount | None = None,
     **details: Any,
 ) -> AsyncIterator[Simulation[Any]]:
     """Runs a simulated arm for the length of a block.
@@ -299,10 +319,12 @@ async def simulate(
         seed: Of the faults.
         faults: What the line does to messages.
         clock: Simulated seconds; by default the event loop's own time, times `speed`.
+        scene: What the arm works in, alone or with others: pieces, belts, sensors, what it can run into.
+        mount: How it stands there, and its tool; by default at the origin, with a suction cup.
         details: What else the model takes: `options`, `quirks`; a Magician also `limits` and `homed`.
 
     Raises:
-        ValueError: No such model, or no such place to listen at.
+        ValueError: No such model, no such place to listen at, or the scene has no room for the arm.
         OSError: The place is taken, or dbus-daemon, which BLE needs, is not installed.
     """
     if model not in MODELS:
@@ -312,9 +334,18 @@ async def simulate(
         raise ValueError(f"speed must be above 0 and finite, not {speed!r}")
 
     serve = endpoint(listen)
-    arm = MODELS[model](clock or Lapse(speed), **details)
-    simulation = Simulation(arm, faults or Faults(), seed)
+    clock = clock or Lapse(speed)
+    if scene is not None:
+        clock = scene.share_clock(clock, speed)
+    elif mount is not None:
+        raise ValueError("mount says how the arm stands in a scene: give scene= as well")
+
+    arm = MODELS[model](clock, **details)
+    simulation = Simulation(arm, faults or Faults(), seed, scene)
     async with AsyncExitStack() as stack:
+        if scene is not None:
+            stack.callback(scene.attach(model, arm, mount or Mount()))
+
         simulation.url = await serve(simulation, stack)
         stack.callback(simulation.end)
         yield simulation

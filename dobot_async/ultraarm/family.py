@@ -12,6 +12,7 @@ FAMILY = Family(
         "dobot_async.ultraarm.params": ("UltraArmAngles", "UltraArmCoords", "UltraArmLimits", "UltraArmPose"),
     },
     simulator="dobot_async.simulator.ultraarm:SimulatedUltraArm",
+    scene="dobot_async.simulator.scene.ultraarm:UltraArmInScene",
     bridge="dobot_async.ultraarm.bridged:BRIDGED",
     discovery="dobot_async.discovery.families:ULTRAARM",
     cli="dobot_async.cli.arms.ultraarm:ULTRAARM",

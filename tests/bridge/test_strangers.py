@@ -207,7 +207,9 @@ async def test_whatever_strangers_say_is_made_printable(
         async with client(rig.url) as plain:
             assert await plain.ask(c.GET_POSE)
 
-        assert rig.told("turned away")[0].startswith("a web page of https://")
+        if b"\x1b" not in origin:  # no header has that
+            assert rig.told("turned away")[0].startswith("a web page of https://")
+
         for event in rig.happened:
             text = str(event)
             assert text.isascii()

@@ -1,0 +1,34 @@
+"""What stands around simulated arms: pieces that they carry, belts, sensors, and what they can run into."""
+
+from dobot_async.simulator.scene.geometry import Place3
+from dobot_async.simulator.scene.scene import Scene
+from dobot_async.simulator.scene.seat import Event, SceneArm
+from dobot_async.simulator.scene.stock import Workpiece
+from dobot_async.simulator.scene.things import (
+    Belt,
+    Block,
+    ColorSpot,
+    CupTool,
+    GripperTool,
+    LightBeam,
+    Mount,
+    PenTool,
+    Piece,
+)
+
+__all__ = [
+    "Belt",
+    "Block",
+    "ColorSpot",
+    "CupTool",
+    "Event",
+    "GripperTool",
+    "LightBeam",
+    "Mount",
+    "PenTool",
+    "Piece",
+    "Place3",
+    "Scene",
+    "SceneArm",
+    "Workpiece",
+]
