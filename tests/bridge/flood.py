@@ -121,7 +121,7 @@ async def flood(name: str, arguments: argparse.Namespace, folder: Path) -> bool:
     began = time.monotonic()
     opened = await connections(url, arguments.connections)
     worst, most = 0.0, 0.0
-    while time.monotonic() < began + arguments.seconds:
+    while not most or time.monotonic() < began + arguments.seconds:
         worst, most = max(worst, await enter(own)), max(most, memory(process))
         await asyncio.sleep(1)
 
