@@ -223,7 +223,8 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
         if command.queueing is Queueing.ALWAYS:
             raise ValueError(f"{command.name} goes through the queue: await arm.queue.put(...)")
 
-        return await self.link.request(command, value, timeout=timeout)
+        request = self.link.request(command, value, timeout=timeout)
+        return await (self.queue.beside(request) if command.moves else request)
 
     async def get_pose(self, *, timeout: float | None = None) -> c.Pose:
         """Returns where the tool is (mm, degrees) and the joints (degrees). Manual 2.4.1."""
@@ -339,7 +340,7 @@ class Magician(Verbs[Coroutine[Any, Any, None]]):
         """
         is_joint, key = direction.value
         async with self.link.cleanup.at_end(self._stop_jog, "the end of the jog"):
-            await self.link.request(c.SET_JOG_CMD, c.JOGCmd(is_joint, key))
+            await self.queue.beside(self.link.request(c.SET_JOG_CMD, c.JOGCmd(is_joint, key)))
             yield
 
     async def _stop_jog(self) -> None:

@@ -52,12 +52,12 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
         Raises:
             MotionStopped: The arm was stopped meanwhile; a part of the program may be stored.
         """
-        program = Program(self)
+        program, epoch = Program(self), self.epoch
         yield program
         outbox = Outbox(lambda _: None)
         outbox.add(program.motions)
         async with self._arm.cleanup.at_end(self._arm.end_download, "the end of the download"):
-            await self.exclusively(self._arm.download(outbox, loops), "the download")
+            await self.exclusively(self._arm.download(outbox, loops), "the download", epoch)
 
 
 class Batch(BatchBuilder, Verbs[Motion]):

@@ -249,7 +249,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         self.link.frame(self._model.row(command), value)
         self._model.check(command, value)
         async with self.link.cleanup.at_end(self._runner.stop, "the end of the jog"):
-            await self._channel.tell(command, value)
+            await self.queue.beside(self._channel.tell(command, value))
             yield
 
     async def jog_stop(self) -> None:

@@ -238,7 +238,7 @@ class UltraArm(Verbs[Coroutine[Any, Any, None]]):
         command, value = c.JOG_JOINT if is_joint else c.JOG_COORD, c.JogMove(axis, way, check_speed(speed))
         self.link.frame(command, value)  # what is wrong is said before anything is sent, a stop included
         async with self.link.cleanup.at_end(self._executor.end_jog, "the end of the jog"):
-            await self._executor.ask(command, value)
+            await self.queue.beside(self._executor.ask(command, value))
             yield
 
     async def jog_stop(self, *, timeout: float = STAYING) -> None:

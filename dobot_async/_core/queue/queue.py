@@ -21,6 +21,7 @@ from collections.abc import Coroutine, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.executor import Entry, Executor, alarmed
 from dobot_async._core.queue.motion import WITHDRAWN, Motion, Outbox
 from dobot_async._core.queue.poller import StatusPoller
@@ -42,13 +43,19 @@ from dobot_async.wire import Command
 __all__ = ["MotionQueue"]
 
 Q = TypeVar("Q")
+T = TypeVar("T")
 logger = logging.getLogger("dobot_async.queue")
 
 
 class MotionQueue:
-    """What is put here the arm executes in order, each exactly once."""
+    """What is put here the arm executes in order, each exactly once.
+
+    Attributes:
+        epoch: What a motion in several steps is bound to; a stop ends it, and the next one is here.
+    """
 
     def __init__(self, executor: Executor) -> None:
+        self.epoch = Epoch()
         self._executor = executor
         executor.on_unknown.add(self.give_up)
         self._outbox = Outbox(self._accepted)
@@ -63,13 +70,16 @@ class MotionQueue:
         """How many accepted commands are not known to have ended."""
         return len(self._pending)
 
-    async def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
+    async def put(
+        self, command: Command[Q, Any], value: Q, *, timeout: float | None = None, epoch: Epoch | None = None
+    ) -> Motion:
         """Give one command to the arm's queue and return once the arm has accepted it.
 
         Args:
             command: A row of the table that may be queued.
             value: Its parameters.
             timeout: Seconds to wait for room in the arm's queue; None waits as long as the arm answers.
+            epoch: The epoch in which the steps that led here began, if others came before.
 
         Raises:
             ValueError: The parameters do not fit, or the command cannot be queued.
@@ -80,18 +90,34 @@ class MotionQueue:
             ConnectionLost: The link is gone.
         """
         motion = Motion(self, self.prepare(command, value))
-        await self.put_all([motion], timeout=timeout)
+        await self.put_all([motion], timeout=timeout, epoch=epoch)
         return motion
 
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
         """Return a checked entry; raise ValueError or TypeError as `put` does."""
         return self._executor.prepare(command, value)
 
-    async def put_all(self, motions: Sequence[Motion], *, timeout: float | None = None) -> None:
-        """Give several commands to the arm's queue with nothing between them; see `put`."""
+    async def put_all(
+        self, motions: Sequence[Motion], *, timeout: float | None = None, epoch: Epoch | None = None
+    ) -> None:
+        """Give several commands to the arm's queue with nothing between them; see `put`.
+
+        Args:
+            motions: What is to be sent.
+            timeout: Seconds to wait for room.
+            epoch: The epoch in which the steps that led here began; a stop since then lets nothing be sent.
+        """
         timeout, call = check_timeout(timeout), object()
         for motion in motions:
             motion.call = call
+
+        try:
+            (epoch or self.epoch).check()
+        except DobotError as error:
+            for motion in motions:
+                motion.end(error)
+
+            raise
 
         self._outbox.add(motions)
         self.write_on()
@@ -154,8 +180,8 @@ class MotionQueue:
         await self._executor.pause()
 
     async def resume(self) -> None:
-        """Let a paused arm go on."""
-        await self._executor.resume()
+        """Let a paused arm go on; a stop ends this call, which raises MotionStopped."""
+        await self.beside(self._executor.resume())
 
     async def stop(self, *, timeout: float = STAYING) -> None:
         """Stop the arm now, ahead of everything; all pending Motions raise MotionStopped, and the queue is empty.
@@ -197,6 +223,7 @@ class MotionQueue:
             error: What they raise.
             spare: Those that are left pending.
         """
+        self.epoch = self.epoch.end(error)
         self._poller.stir()
         ending = [motion for motion in self._pending if motion not in spare]
         self._pending = deque(spare)
@@ -228,9 +255,33 @@ class MotionQueue:
         """While this is entered, the arm is asked how far it is."""
         return self._poller.watching()
 
-    async def exclusively(self, work: Coroutine[Any, Any, None], what: str) -> None:
-        """Run work while nothing is sent; a stop ends it, and raises MotionStopped."""
-        await self._writer.exclusively(work, what)
+    async def exclusively(self, work: Coroutine[Any, Any, None], what: str, epoch: Epoch | None = None) -> None:
+        """Run work while nothing is sent; a stop ends it, and raises MotionStopped.
+
+        Args:
+            work: What is to be done.
+            what: Its name.
+            epoch: The epoch in which the steps that led here began.
+        """
+        await self._writer.exclusively(work, what, epoch or self.epoch)
+
+    async def beside(self, work: Coroutine[Any, Any, T], epoch: Epoch | None = None) -> T:
+        """Run work that sets the arm in motion without a Motion of its own, such as the begin of a jog.
+
+        A stop ends it before the arm is told to stop, so that nothing is repeated behind the stop.
+
+        Args:
+            work: What is to be done.
+            epoch: The epoch in which the steps that led here began.
+
+        Raises:
+            MotionStopped: The arm was stopped meanwhile.
+        """
+        return await self._stopper.beside(work, epoch or self.epoch)
+
+    async def stops_heard(self) -> None:
+        """Return when no stop goes on any more; raise ReplyTimeout if the arm does not hear it."""
+        await self._stopper.over()
 
     async def look(self, *, alarms: bool) -> None:
         """Ask the arm how far it is, and end the Motions that this decides."""
