@@ -1,7 +1,8 @@
 """Where an arm comes along: what the guard asks of a family, and the answer of those whose ways are not known.
 
     stance = await planner.look()            where it stands now
-    plan = await planner.plan(value, stance)     where a command leads, and where the arm stands then
+    plan = await planner.plan(value, stance)     where a motion leads, and where the arm stands then
+    plan = planner.change(value, stance)         the same of what moves nothing, such as another end effector
 
 Lengths are mm, in the arm's coordinates where it stands at l = 0 of its rail.
 """
@@ -11,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
 from dobot_async.fleet.frames import BaseFrame, Place
 from dobot_async.fleet.zones import Zones
@@ -79,11 +80,14 @@ class Stance(Protocol):
     def region(self) -> Region:
         """Where the tool may be, as far as that is known."""
 
-    def near(self, other: Stance) -> bool:
+    def near(self, other: Self) -> bool:
         """Return whether another one is the same, but for what numbers lose on the line."""
 
 
-class Plan(NamedTuple):
+S = TypeVar("S", bound=Stance)
+
+
+class Plan(NamedTuple, Generic[S]):
     """Where a command leads.
 
     Attributes:
@@ -94,21 +98,21 @@ class Plan(NamedTuple):
     """
 
     region: Region
-    end: Any
+    end: S | None
     outline: Sequence[XYZ] | None
 
 
-class Planner(Protocol):
+class Planner(Protocol[S]):
     """What a family knows of the ways of its arms."""
 
-    async def look(self) -> Any:
-        """Read where the arm stands, as a `Stance`."""
+    async def look(self) -> S:
+        """Read where the arm stands."""
 
     async def tool(self) -> XYZ:
         """Read where its tool is, and nothing else."""
 
-    async def plan(self, value: object, start: Any) -> Plan | None:
-        """Return where a command leads from a stance, None for what does not change where the tool is.
+    async def plan(self, value: object, start: S | None) -> Plan[S]:
+        """Return where a motion leads from a stance.
 
         Args:
             value: The command's parameters.
@@ -118,7 +122,10 @@ class Planner(Protocol):
             ValueError: It leads where the arm cannot go, or cannot be guarded.
         """
 
-    def reach(self, stance: Any) -> Region:
+    def change(self, value: object, start: S | None) -> Plan[S] | None:
+        """Return what a command does that moves nothing: where the tool is then; None if it changes no way."""
+
+    def reach(self, stance: S | None) -> Region:
         """Return where the arm may come on ways that are not known."""
 
 
@@ -133,7 +140,7 @@ class Somewhere:
         """The place alone."""
         return Points([self.tool])
 
-    def near(self, other: Stance) -> bool:
+    def near(self, other: Somewhere) -> bool:
         """Return whether it is the same place."""
         return math.dist(self.tool, other.tool) < 1.0
 
@@ -143,7 +150,6 @@ class Unplanned:
 
     Args:
         place: Reads where the tool is.
-        moves: Tells which parameters are of a motion; all are, unless it is given.
     """
 
     def __init__(self, place: Callable[[], Awaitable[Place]]) -> None:
@@ -158,10 +164,13 @@ class Unplanned:
         x, y, z, _ = await self._place()
         return x, y, z
 
-    async def plan(self, value: object, start: Any) -> Plan | None:  # noqa: ARG002 - no way is known
+    async def plan(self, value: object, start: Somewhere | None) -> Plan[Somewhere]:  # noqa: ARG002 - no way is known
         """Return anywhere."""
         return Plan(Discs(), None, None)
 
-    def reach(self, stance: Any) -> Region:  # noqa: ARG002
+    def change(self, value: object, start: Somewhere | None) -> None:
+        """Return None: as no way is known, none changes."""
+
+    def reach(self, stance: Somewhere | None) -> Region:  # noqa: ARG002
         """Return everywhere."""
         return Discs()

@@ -41,7 +41,7 @@ class BatchBuilder:
 
 @asynccontextmanager
 async def batch(queue: MotionQueue, builder: B, timeout: float | None) -> AsyncIterator[B]:
-    """Queue what the block collects, with nothing between it, when the block ends; an error or a stop since it began sends none."""
+    """Queue what the block collects, with nothing between it, when the block ends; an error or a stop sends none."""
     timeout, epoch = check_timeout(timeout), queue.epoch
     try:
         yield builder
