@@ -126,7 +126,7 @@ class Crew(Generic[A]):
                 continue
 
             if seat.commands:
-                task = seat.begin_stop(seat.stopped)
+                task = seat.queue.begin_stop(seat.stopped)
                 self._stopping[task] = seat
                 task.add_done_callback(self._stopping.pop)
 

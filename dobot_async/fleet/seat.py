@@ -257,8 +257,11 @@ class Seat:
                 self.arm.link.send_nowait(self._halting)
 
     def begin_stop(self, error: DobotError) -> asyncio.Task[None]:
-        """Ends all Motions with an error; returns the task that tells the arm to stop until it has heard it."""
-        return self.queue.begin_stop(error)
+        """Ends all Motions with an error; returns the task that tells the arm to stop until it has heard it.
+
+        The caller is told of it, and so the queue's `join` is not.
+        """
+        return self.queue.begin_own_stop(error)
 
     async def stop_heard(self, stop: asyncio.Task[None]) -> str:
         """Waits for what `begin_stop` has begun, for so long as one does on the way out of a block.

@@ -212,6 +212,12 @@ class MotionQueue:
         """
         return self._stopper.begin(error, halt=halt, doubtful=doubtful)
 
+    def begin_own_stop(self, error: DobotError, *, halt: bool = True) -> asyncio.Task[None]:
+        """Begin to stop the arm for who knows of it: `join` does not tell of this stop again; see `begin_stop`."""
+        stop = self.begin_stop(error, halt=halt)
+        self._failure = None
+        return stop
+
     def stopping(self) -> AbstractContextManager[None]:
         """While this is entered nothing is sent, and nothing that the arm ticks off counts as done."""
         return self._stopper.holding()
@@ -347,9 +353,7 @@ class MotionQueue:
 
     async def _stop(self, error: DobotError, timeout: float, *, halt: bool) -> None:
         """Stop, and wait until the arm has heard it."""
-        stop = self.begin_stop(error, halt=halt)
-        self._failure = None  # whoever stops an arm knows that it was stopped
-        await self._stopper.wait(stop, timeout)
+        await self._stopper.wait(self.begin_own_stop(error, halt=halt), timeout)
 
     def _prune(self) -> None:
         while self._pending and self._pending[0].ended:

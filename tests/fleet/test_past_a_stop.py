@@ -1,0 +1,169 @@
+"""Nothing goes on past a stop: whatever an arm is in the middle of, once the stop has returned it does not move.
+
+Each scenario is run once for each step of all its tasks, and stopped at that step. MOMENTS=all does so with more of
+them: on slow links, and in longer programs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from itertools import count
+from typing import Any
+
+import pytest
+from steps import Steps
+from virtual import virtual
+
+from dobot_async import DobotError, Fleet, Jog, Magician, MotionStopped, PTPMode, SuctionCup
+from dobot_async.fleet import BarrierBroken, BaseFrame, Box, Cylinder, Member
+from dobot_async.magician import commands as c
+from dobot_async.simulator import Faults, Simulation, simulate
+
+ALL = os.environ.get("MOMENTS") == "all"
+ZONES: Mapping[str, Box | Cylinder | None] = {"bin": Box((240, 300), (-40, 40), (0, 80)), "belt": None}
+HERE, THERE, IN = (200, -120, 40), (200, 120, 40), (270, 0, 40)
+LONGER = 0.15  # virtual seconds in which an arm that goes on would be seen to: half a minute of its own
+
+Cell = tuple[Fleet[Magician], Mapping[str, Simulation]]
+Scenario = Callable[[Fleet[Magician]], Coroutine[Any, Any, None]]
+
+
+@asynccontextmanager
+async def cell(latency: float = 0.002) -> AsyncIterator[Cell]:
+    """Two guarded arms, far from each other but for one zone."""
+    bases = {"left": BaseFrame(), "right": BaseFrame(540, 0, 0, 180)}
+    async with AsyncExitStack() as stack:
+        sims = {
+            name: await stack.enter_async_context(simulate(speed=200, faults=Faults(latency=latency))) for name in bases
+        }
+        place(sims)
+        members = {name: Member(sim.url, Magician, base=bases[name], guard="wait") for name, sim in sims.items()}
+        yield await stack.enter_async_context(Fleet.connect(members, zones=ZONES)), sims
+
+
+def place(sims: Mapping[str, Simulation]) -> None:
+    """Leads all arms to where they begin."""
+    for sim in sims.values():
+        sim.arm.guide_to(*HERE)
+
+
+async def alone(fleet: Fleet[Magician]) -> None:
+    await fleet["left"].move_to(*THERE, mode=PTPMode.JUMP_XYZ)
+
+
+async def each(fleet: Fleet[Magician]) -> None:
+    async def there(arm: Magician) -> None:
+        await arm.set_end_effector(SuctionCup())
+        await arm.move_to(*THERE)
+
+    await fleet.each(there)
+
+
+async def together(fleet: Fleet[Magician]) -> None:
+    async with fleet.together() as batches:
+        for name in batches:
+            batches[name].move_to(*THERE)
+
+    await batches.wait()
+
+
+async def batch(fleet: Fleet[Magician]) -> None:
+    async with fleet["left"].queue.batch() as steps:
+        steps.move_to(*THERE)
+        await asyncio.sleep(0.001)
+        steps.move_to(*HERE)
+
+    await fleet["left"].queue.join()
+
+
+async def programs(fleet: Fleet[Magician]) -> None:
+    """They meet, and take turns in a zone, and do not take a stop for an answer."""
+
+    async def program(name: str) -> None:
+        for _ in range(2):
+            with suppress(MotionStopped, BarrierBroken):
+                await fleet.barrier("meet")
+                async with fleet.zone("belt"):
+                    await asyncio.sleep(0.001)
+
+            with suppress(MotionStopped):
+                await fleet[name].move_to(*IN)
+                await fleet[name].move_to(*HERE)
+
+    await fleet.run({name: program(name) for name in fleet})
+
+
+async def download(fleet: Fleet[Magician]) -> None:
+    moving = await fleet["left"].queue.move_to(*THERE)
+    async with fleet["left"].queue.download() as program:
+        program.move_to(*HERE)
+        await asyncio.sleep(0.001)
+
+    await moving
+
+
+async def jog(fleet: Fleet[Magician]) -> None:
+    with suppress(MotionStopped):
+        await fleet["left"].jog(Jog.Y_PLUS, 0.002)
+
+    await asyncio.sleep(LONGER)
+
+
+async def pause(fleet: Fleet[Magician]) -> None:
+    await fleet["left"].queue.move_to(*THERE)
+    back = await fleet["left"].queue.move_to(*HERE)
+    await fleet["left"].pause()
+    await fleet["left"].resume()
+    await back
+
+
+SCENARIOS: list[Scenario] = [alone, each, together, batch, programs, download, jog, pause]
+
+
+async def stopped_at(step: int, scenario: Scenario, fleet: Fleet[Magician], sims: Mapping[str, Simulation]) -> bool:
+    """Stops a scenario at one of its steps; returns whether it has that many."""
+    stops: list[asyncio.Task[None]] = []
+    steps = Steps(step, lambda: stops.append(asyncio.create_task(fleet.stop())))
+    work = steps.begin(scenario(fleet))
+    await asyncio.wait([work], timeout=30)
+    if not stops:
+        assert work.done(), "it hangs"
+        work.result()
+        return False
+
+    (stop,) = stops
+    await stop
+    since = {name: sim.arm.device.now for name, sim in sims.items()}
+    before = {name: sim.arm.device.joints for name, sim in sims.items()}
+    await asyncio.sleep(LONGER)
+    for name, sim in sims.items():
+        late = [each for each in sim.arm.executed if each.command and each.command.moves and each.finished > since[name]]
+        assert not late, f"{name} moves after the stop at step {step} of {scenario.__name__}: {late}"
+        assert sim.arm.device.joints == before[name], f"{name} moved after the stop at step {step}"
+        assert sim.arm.device.idle
+
+    if not work.done():
+        work.cancel()
+        await asyncio.wait([work])
+
+    error = None if work.cancelled() else work.exception()
+    assert error is None or isinstance(error, DobotError), error
+    return True
+
+
+@pytest.mark.parametrize("latency", [0.002, *([0.0, 0.03] if ALL else [])])
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.__name__)
+def test_at_each_step(scenario: Scenario, latency: float) -> None:
+    @virtual
+    async def scene() -> None:
+        async with cell(latency) as (fleet, sims):
+            for step in count(1):
+                place(sims)
+                if not await stopped_at(step, scenario, fleet, sims):
+                    assert step > 10
+                    break
+
+    scene()
