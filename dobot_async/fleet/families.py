@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
@@ -27,6 +27,7 @@ from dobot_async.families import Each
 from dobot_async.fleet.frames import Place
 from dobot_async.fleet.magician_planner import MagicianPlanner
 from dobot_async.fleet.planner import Planner, Unplanned
+from dobot_async.fleet.zones import here
 from dobot_async.magician import commands as magician
 from dobot_async.magician.arm import STILL, Jog, Magician
 from dobot_async.magician.queue import Batch, MagicianQueue
@@ -113,6 +114,16 @@ class FleetQueue(MotionQueue):
     async def put_admitted(self, motions: Sequence[Motion], timeout: float | None, epoch: Epoch) -> None:
         """Gives several commands that the fleet allows to the arm's queue."""
         await super().put_all(motions, timeout=timeout, epoch=epoch)
+
+    async def exclusively(self, work: Coroutine[Any, Any, None], what: str, epoch: Epoch | None = None) -> None:
+        """Runs work while nothing is sent, for a program that may go on; see `MotionQueue.exclusively`."""
+        try:
+            here().check()
+        except BaseException:
+            work.close()
+            raise
+
+        await super().exclusively(work, what, epoch)
 
     def fail(self, error: DobotError, *, spare: Sequence[Motion] = ()) -> None:
         """Ends all Motions with an error, and tells the fleet; see `MotionQueue.fail`."""

@@ -97,12 +97,15 @@ async def programs(fleet: Fleet[Magician]) -> None:
 
 
 async def download(fleet: Fleet[Magician]) -> None:
-    moving = await fleet["left"].queue.move_to(*THERE)
-    async with fleet["left"].queue.download() as program:
-        program.move_to(*HERE)
-        await asyncio.sleep(0.001)
+    async def program() -> None:
+        moving = await fleet["left"].queue.move_to(*THERE)
+        async with fleet["left"].queue.download() as steps:
+            steps.move_to(*HERE)
+            await asyncio.sleep(0.05)  # longer than a stop takes
 
-    await moving
+        await moving
+
+    await fleet.run({"left": program()})
 
 
 async def jog(fleet: Fleet[Magician]) -> None:
@@ -113,20 +116,34 @@ async def jog(fleet: Fleet[Magician]) -> None:
 
 
 async def pause(fleet: Fleet[Magician]) -> None:
-    await fleet["left"].queue.move_to(*THERE)
-    back = await fleet["left"].queue.move_to(*HERE)
-    await fleet["left"].pause()
-    await fleet["left"].resume()
-    await back
+    async def program() -> None:
+        await fleet["left"].queue.move_to(*THERE)
+        back = await fleet["left"].queue.move_to(*HERE)
+        await fleet["left"].pause()
+        await fleet["left"].resume()
+        await back
+
+    await fleet.run({"left": program()})
 
 
 SCENARIOS: list[Scenario] = [alone, each, together, batch, programs, download, jog, pause]
 
 
+def stored(sim: Simulation) -> object:
+    """The program in the arm's flash, as far as it has come."""
+    program = sim.arm.program
+    return program and (id(program), len(program.commands))
+
+
 async def stopped_at(step: int, scenario: Scenario, fleet: Fleet[Magician], sims: Mapping[str, Simulation]) -> bool:
     """Stops a scenario at one of its steps; returns whether it has that many."""
-    stops: list[asyncio.Task[None]] = []
-    steps = Steps(step, lambda: stops.append(asyncio.create_task(fleet.stop())))
+    stops: list[asyncio.Task[Mapping[str, tuple[float, Any, Any]]]] = []
+
+    async def stop() -> Mapping[str, tuple[float, Any, Any]]:
+        await fleet.stop()
+        return {name: (sim.arm.device.now, sim.arm.device.joints, stored(sim)) for name, sim in sims.items()}
+
+    steps = Steps(step, lambda: stops.append(asyncio.create_task(stop())))
     work = steps.begin(scenario(fleet))
     await asyncio.wait([work], timeout=30)
     if not stops:
@@ -134,16 +151,15 @@ async def stopped_at(step: int, scenario: Scenario, fleet: Fleet[Magician], sims
         work.result()
         return False
 
-    (stop,) = stops
-    await stop
-    since = {name: sim.arm.device.now for name, sim in sims.items()}
-    before = {name: sim.arm.device.joints for name, sim in sims.items()}
+    stood = await stops[0]
     await asyncio.sleep(LONGER)
     for name, sim in sims.items():
-        late = [each for each in sim.arm.executed if each.command and each.command.moves and each.finished > since[name]]
-        assert not late, f"{name} moves after the stop at step {step} of {scenario.__name__}: {late}"
-        assert sim.arm.device.joints == before[name], f"{name} moved after the stop at step {step}"
+        stopped, joints, program = stood[name]
+        moves = [each for each in sim.arm.executed if each.command and each.command.moves and each.finished > stopped]
+        assert not moves, f"{name} moves after the stop at step {step} of {scenario.__name__}: {moves}"
+        assert sim.arm.device.joints == joints, f"{name} moved after the stop at step {step} of {scenario.__name__}"
         assert sim.arm.device.idle
+        assert stored(sim) == program, f"a download went on after the stop at step {step}"
 
     if not work.done():
         work.cancel()
@@ -167,3 +183,96 @@ def test_at_each_step(scenario: Scenario, latency: float) -> None:
                     break
 
     scene()
+
+
+@virtual
+async def test_a_jog_whose_begin_was_lost_is_not_repeated_behind_a_stop() -> None:
+    async with cell() as (fleet, sims):
+        arm, sim = fleet["left"], sims["left"]
+        jogging = asyncio.create_task(arm.jog(Jog.Y_PLUS, 1))
+        await asyncio.sleep(0)
+        sim.faults.loss = 1.0
+        await asyncio.sleep(0.001)
+        sim.faults.loss = 0.0
+        await arm.stop()
+        joints = sim.arm.device.joints
+        with pytest.raises(MotionStopped):
+            await jogging
+
+        await asyncio.sleep(LONGER)
+        assert sim.arm.device.joints == joints
+
+
+@virtual
+async def test_a_program_that_stops_the_fleet_itself_goes_on_and_the_others_do_not() -> None:
+    async with cell() as (fleet, sims):
+
+        async def left() -> None:
+            await asyncio.sleep(0.001)
+            await fleet.stop()
+            await fleet["left"].move_to(*THERE)
+
+        async def right() -> str:
+            with suppress(MotionStopped):
+                await fleet["right"].queue.wait(60)
+                await fleet["right"].queue.join()
+
+            await asyncio.sleep(1)
+            with pytest.raises(MotionStopped, match="the fleet was stopped"):
+                await fleet["right"].move_to(*THERE)
+
+            return "stopped"
+
+        done = await fleet.run({"left": left(), "right": right()})
+        assert done["right"] == "stopped"
+        assert sims["left"].arm.pose.y == pytest.approx(THERE[1], abs=0.1)
+        assert sims["right"].arm.pose.y == pytest.approx(HERE[1], abs=0.1)
+        await fleet["right"].move_to(*THERE)
+
+
+@virtual
+async def test_a_stop_of_one_arm_ends_the_start_of_all() -> None:
+    async with cell(0.03) as (fleet, sims):
+
+        async def start() -> None:
+            async with fleet.together() as batches:
+                for name in batches:
+                    batches[name].move_to(*THERE)
+
+        starting = asyncio.create_task(start())
+        await asyncio.sleep(0.2)
+        await fleet["left"].stop()
+        with pytest.raises(MotionStopped):
+            await starting
+
+        await asyncio.sleep(1)
+        assert [sim.arm.pose.y for sim in sims.values()] == pytest.approx([HERE[1]] * 2, abs=0.1)
+
+
+@virtual
+async def test_what_was_told_of_a_stop_is_not_told_again_when_the_fleet_starts_together() -> None:
+    async with cell() as (fleet, _):
+        await fleet["left"].queue.wait(60)
+        await fleet.stop()
+        await together(fleet)
+
+
+@virtual
+async def test_a_stop_of_an_arm_ends_what_was_collected_for_it_before() -> None:
+    async with cell() as (fleet, sims):
+        arm, sim = fleet["left"], sims["left"]
+        with pytest.raises(MotionStopped):
+            async with arm.queue.download() as program:
+                program.move_to(*THERE)
+                await arm.stop()
+
+        with pytest.raises(MotionStopped):
+            async with arm.queue.batch() as batch:
+                motion = batch.move_to(*THERE)
+                await arm.stop()
+
+        with pytest.raises(MotionStopped):
+            await motion
+
+        assert sim.arm.program is None
+        assert not any(each.command is c.SET_PTP_CMD for each in sim.arm.executed)

@@ -71,9 +71,6 @@ class Stopper:
         self.count += 1
         self._under_way += 1
         self._queue.cancel_writer()
-        for task in self._beside:
-            task.cancel()
-
         self._queue.fail(error, spare=doubtful)
         what = "the arm's stop" if halt else "the emptying of the arm's queue"
         task = self._executor.cleanup.start(self._stop(error, halt=halt, doubtful=doubtful), what)
@@ -131,7 +128,7 @@ class Stopper:
             if doubtful:  # their fate is not awaited for longer than an arm may be silent
                 asyncio.get_running_loop().call_later(STAYING, end_all, doubtful, error)
 
-            for task in list(self._beside):
+            for task in list(self._beside):  # nothing of it is sent behind the stop
                 await cancel_and_join(task)
 
             if halt:
