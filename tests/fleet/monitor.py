@@ -37,10 +37,11 @@ class Zone:
     half: tuple[float, float, float]
     radius: float = 0.0
 
-    def has(self, place: tuple[float, float, float]) -> bool:
-        """Whether a place is inside."""
-        away = [abs(a - b) for a, b in zip(place, self.centre, strict=True)]
-        flat = math.hypot(*away[:2]) < self.radius if self.radius else away[0] < self.half[0] and away[1] < self.half[1]
+    def has(self, place: tuple[float, float, float], margin: float = 0.0) -> bool:
+        """Whether a place is inside, or so near."""
+        away = [abs(a - b) - margin for a, b in zip(place, self.centre, strict=True)]
+        beside = math.dist(place[:2], self.centre[:2]) - margin
+        flat = beside < self.radius if self.radius else away[0] < self.half[0] and away[1] < self.half[1]
         return flat and away[2] < self.half[2]
 
 

@@ -1,6 +1,6 @@
 """One seed is one run of guarded arms in a random cell, under the eyes of a monitor that knows only where the tools are.
 
-    make guards [CELLS=10000] [FIRST=0]      runs many of them
+    make soak OF=guards [SEEDS=10000] [FIRST=0]      runs many of them
 
 Arms come with something left in their queues, change their tools at once and in the queue, ride on rails, jog, home,
 jump, raise alarms, are stopped, and are switched off and on. What must hold: no two tools are ever in one zone.
@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from contextlib import AsyncExitStack, suppress
 from dataclasses import dataclass
 from random import Random
@@ -29,8 +29,12 @@ __all__ = ["Figures", "Violation", "run_seed"]
 
 AWAY = (150.0, -190.0, 60.0)
 START = (-51.71, 22.01, 26.31, 0.0, 0.0)  # about the joints of that place
+NEAR = 10.0  # mm; nearer to a zone than this, nobody stands at the beginning
 LONG = 400.0  # virtual seconds after which somebody hangs
 SPEED = 5.0
+GRACE = 0.1  # virtual seconds after a stop has returned in which an arm comes to rest
+WATCHED = 2.0  # virtual seconds for which it is watched then
+LOOK = 0.02
 TOOLS = [(59.7, 0.0, 0.0), (70.0, 0.0, 0.0), (110.0, 0.0, 0.0), (40.0, 25.0, -20.0), (90.0, -30.0, 30.0)]
 MODES = [mode for mode in PTPMode if "INC" not in mode.name and "ANGLE" not in mode.name]
 
@@ -94,6 +98,19 @@ class Cell:
                 await self.fleet[name].recover()
                 if random.random() < 0.5:
                     await self.fleet[name].set_end_effector(c.EndEffectorParams(*self.monitor.tool(name)))
+
+
+    async def stop(self) -> None:
+        """Stops all at some moment; nobody may move any more soon after that has returned, whatever programs do."""
+        await asyncio.sleep(self.random.uniform(0, 5))
+        await self.fleet.stop()
+        await asyncio.sleep(GRACE)
+        stood = {name: sim.arm.device.joints for name, sim in self.sims.items()}
+        for _ in range(round(WATCHED / LOOK)):
+            await asyncio.sleep(LOOK)
+            moved = [name for name, sim in self.sims.items() if sim.arm.device.joints != stood[name]]
+            if moved:
+                raise Violation(f"{moved} moved after the stop of the fleet")
 
 
 def place(random: Random) -> tuple[float, float, float]:
@@ -219,6 +236,16 @@ async def power(cell: Cell, name: str, arm: Magician, random: Random) -> None:
     await arm.queue.join()
 
 
+async def together(cell: Cell, name: str, _: Magician, random: Random) -> None:
+    other = random.choice([each for each in cell.sims if each != name])
+    async with cell.fleet.together(name, other) as batches:
+        for each in batches:
+            for _ in range(random.randint(1, 3)):
+                batches[each].move_to(*place(random), mode=random.choice(MODES))
+
+    await batches.wait()
+
+
 async def hold(cell: Cell, _: str, arm: Magician, random: Random) -> None:
     async with cell.fleet.zone(random.choice(list(cell.monitor.zones)), timeout=5):
         await arm.move_to(*place(random))
@@ -231,8 +258,8 @@ async def cancelled(_: Cell, __: str, arm: Magician, random: Random) -> None:
 
 
 STEPS = [move, joints, increment, away, batch, path, change, change_on_the_way, lift, ride, jog, home, stop, alarm]
-STEPS += [power, hold, cancelled, rest]
-WEIGHTS = [12, 5, 4, 8, 6, 3, 3, 3, 2, 4, 2, 1, 3, 2, 2, 3, 3, 8]
+STEPS += [power, hold, cancelled, rest, together]
+WEIGHTS = [12, 5, 4, 8, 6, 3, 3, 3, 2, 4, 2, 1, 3, 2, 2, 3, 3, 8, 3]
 
 
 def some_zone(random: Random) -> tuple[Zone, Box | Cylinder]:
@@ -256,8 +283,8 @@ async def leave_something(sim: Simulation, random: Random) -> None:
             await arm.queue.wait(random.uniform(0, 5))
 
 
-async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]) -> Figures:
-    """Runs a seed."""
+async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None], *, stopped: bool) -> Figures:
+    """Runs a seed, to the end of all programs, or until the fleet is stopped."""
     random, loop = Random(seed), asyncio.get_running_loop()
     names = "abcd"[: random.randint(2, 4)]
     stands = {
@@ -273,7 +300,7 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
     zones = {}
     while not zones:
         zones = {f"zone {number}": some_zone(random) for number in range(random.randint(1, 3))}
-        if any(each.has(stand.tool(START, TOOLS[0])) for each, _ in zones.values() for stand in stands.values()):
+        if any(each.has(stand.tool(START, TOOLS[0]), NEAR) for each, _ in zones.values() for stand in stands.values()):
             zones = {}  # somebody would stand in it from the beginning
 
     async with AsyncExitStack() as stack:
@@ -301,8 +328,12 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
             fleet = await stack.enter_async_context(connecting)
             cell = Cell(random, sims, fleet, monitor, say)
             steps = random.randint(4, 12)
-            async with asyncio.timeout(LONG):
-                await fleet.run({name: cell.program(name, Random(random.random()), steps) for name in names})
+            work = fleet.run({name: cell.program(name, Random(random.random()), steps) for name in names})
+            if stopped:
+                await stop_in(work, cell)
+            else:
+                async with asyncio.timeout(LONG):
+                    await work
         except TimeoutError:
             raise Violation(f"somebody hangs; held: {[(zone, fleet.holders(zone)) for zone in zones]}") from None
         finally:
@@ -314,12 +345,28 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
         return Figures(loop.time(), cell.told, cell.done, monitor.seen, cell.failures)
 
 
-def run_seed(seed: int, say: Callable[[str], None] = lambda _: None, guard: Literal["on", "off"] = "on") -> Figures:
+async def stop_in(work: Coroutine[Any, Any, Any], cell: Cell) -> None:
+    """Stops the fleet in the middle of work."""
+    working = asyncio.create_task(work)
+    try:
+        await cell.stop()
+    finally:
+        working.cancel()
+        await asyncio.wait([working])
+
+
+def run_seed(
+    seed: int,
+    say: Callable[[str], None] = lambda _: None,
+    *,
+    guard: Literal["on", "off"] = "on",
+    stopped: bool = False,
+) -> Figures:
     """Runs a seed; raises Violation if something does not hold."""
     found: list[Figures] = []
 
     async def scene() -> None:
-        found.append(await run(seed, guard, say))
+        found.append(await run(seed, guard, say, stopped=stopped))
 
     logging.getLogger("dobot_async").setLevel(logging.CRITICAL + 1)
     run_virtual(scene())
