@@ -1,4 +1,4 @@
-"""One seed is one run of guarded arms in a random cell, under the eyes of a monitor that knows only where the tools are.
+"""One seed is one run of guarded arms in a random cell, watched by a monitor that knows only where the tools are.
 
     make soak OF=guards [SEEDS=10000] [FIRST=0]      runs many of them
 
@@ -99,7 +99,6 @@ class Cell:
                 if random.random() < 0.5:
                     await self.fleet[name].set_end_effector(c.EndEffectorParams(*self.monitor.tool(name)))
 
-
     async def stop(self) -> None:
         """Stops all at some moment; nobody may move any more soon after that has returned, whatever programs do."""
         await asyncio.sleep(self.random.uniform(0, 5))
@@ -111,6 +110,9 @@ class Cell:
             moved = [name for name, sim in self.sims.items() if sim.arm.device.joints != stood[name]]
             if moved:
                 raise Violation(f"{moved} moved after the stop of the fleet")
+
+
+Step = Callable[[Cell, str, Magician, Random], Coroutine[Any, Any, None]]
 
 
 def place(random: Random) -> tuple[float, float, float]:
@@ -130,7 +132,7 @@ async def joints(_: Cell, __: str, arm: Magician, random: Random) -> None:
 
 async def increment(_: Cell, __: str, arm: Magician, random: Random) -> None:
     mode = random.choice([PTPMode.MOVJ_INC, PTPMode.MOVL_INC, PTPMode.MOVJ_XYZ_INC])
-    await arm.move_by(*(random.uniform(-40, 40) for _ in range(3)), mode=mode)
+    await arm.move_by(*(random.uniform(-40, 40) for _step in range(3)), mode=mode)
 
 
 async def rest(_: Cell, __: str, arm: Magician, random: Random) -> None:
@@ -144,7 +146,7 @@ async def away(_: Cell, __: str, arm: Magician, ___: Random) -> None:
 
 async def batch(_: Cell, __: str, arm: Magician, random: Random) -> None:
     async with arm.queue.batch() as steps:
-        for _ in range(random.randint(2, 5)):
+        for _step in range(random.randint(2, 5)):
             match random.randrange(5):
                 case 0:
                     steps.put(c.SET_END_EFFECTOR_PARAMS, c.EndEffectorParams(*random.choice(TOOLS)))
@@ -161,7 +163,7 @@ async def batch(_: Cell, __: str, arm: Magician, random: Random) -> None:
 
 async def path(_: Cell, __: str, arm: Magician, random: Random) -> None:
     async with arm.queue.batch() as steps:
-        for _ in range(random.randint(2, 5)):
+        for _step in range(random.randint(2, 5)):
             steps.path_to(*place(random))
 
         steps.arc((*place(random), 0.0), (*place(random), 0.0))
@@ -181,7 +183,7 @@ async def change(_: Cell, __: str, arm: Magician, random: Random) -> None:
 
 
 async def change_on_the_way(_: Cell, __: str, arm: Magician, random: Random) -> None:
-    for _ in range(2):
+    for _step in range(2):
         await arm.queue.move_to(*place(random), mode=random.choice(MODES))
 
     await asyncio.sleep(random.random() / 5)
@@ -218,7 +220,7 @@ async def stop(_: Cell, __: str, arm: Magician, random: Random) -> None:
 
 
 async def alarm(cell: Cell, name: str, arm: Magician, random: Random) -> None:
-    for _ in range(2):
+    for _step in range(2):
         await arm.queue.move_to(*place(random), mode=random.choice(MODES))
 
     await asyncio.sleep(random.random() / 3)
@@ -240,7 +242,7 @@ async def together(cell: Cell, name: str, _: Magician, random: Random) -> None:
     other = random.choice([each for each in cell.sims if each != name])
     async with cell.fleet.together(name, other) as batches:
         for each in batches:
-            for _ in range(random.randint(1, 3)):
+            for _step in range(random.randint(1, 3)):
                 batches[each].move_to(*place(random), mode=random.choice(MODES))
 
     await batches.wait()
@@ -257,7 +259,22 @@ async def cancelled(_: Cell, __: str, arm: Magician, random: Random) -> None:
             await arm.move_to(*place(random), mode=random.choice(MODES))
 
 
-STEPS = [move, joints, increment, away, batch, path, change, change_on_the_way, lift, ride, jog, home, stop, alarm]
+STEPS: list[Step] = [
+    move,
+    joints,
+    increment,
+    away,
+    batch,
+    path,
+    change,
+    change_on_the_way,
+    lift,
+    ride,
+    jog,
+    home,
+    stop,
+    alarm,
+]
 STEPS += [power, hold, cancelled, rest, together]
 WEIGHTS = [12, 5, 4, 8, 6, 3, 3, 3, 2, 4, 2, 1, 3, 2, 2, 3, 3, 8, 3]
 
@@ -278,7 +295,7 @@ async def leave_something(sim: Simulation, random: Random) -> None:
     """What an earlier program leaves in the queue of an arm."""
     async with Magician.connect(sim.url) as arm:
         await arm.queue.wait(random.uniform(0, 10))
-        for _ in range(random.randint(1, 3)):
+        for _step in range(random.randint(1, 3)):
             await arm.queue.move_to(*place(random))
             await arm.queue.wait(random.uniform(0, 5))
 
@@ -297,14 +314,15 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
         )
         for name in names
     }
-    zones = {}
+    zones: dict[str, tuple[Zone, Box | Cylinder]] = {}
     while not zones:
         zones = {f"zone {number}": some_zone(random) for number in range(random.randint(1, 3))}
         if any(each.has(stand.tool(START, TOOLS[0]), NEAR) for each, _ in zones.values() for stand in stands.values()):
             zones = {}  # somebody would stand in it from the beginning
 
     async with AsyncExitStack() as stack:
-        sims, members = {}, {}
+        sims: dict[str, Simulation] = {}
+        members: dict[str, Member[Magician]] = {}
         for name, stand in stands.items():
             faults = Faults(latency=random.choice([0.0, 0.003, 0.02]), loss=random.choice([0.0, 0.0, 0.02]))
             sims[name] = sim = await stack.enter_async_context(

@@ -1,6 +1,6 @@
 """One seed is one random cell that is stopped at a random moment: 0.1 s after that has returned, no arm moves.
 
-    make soak OF=stops [SEEDS=1000] [FIRST=0]     runs many of them
+make soak OF=stops [SEEDS=1000] [FIRST=0]     runs many of them
 """
 
 from __future__ import annotations
