@@ -44,7 +44,7 @@ class Steps:
 
 
 def factory(
-    loop: asyncio.AbstractEventLoop, work: Coroutine[Any, Any, Any], context: Context | None = None, **details: Any
+    loop: asyncio.AbstractEventLoop, work: Any, context: Context | None = None, **details: Any
 ) -> asyncio.Task[Any]:
     """Makes tasks; those of work that is counted tell of each of their steps."""
     steps = (context or copy_context()).get(counting)

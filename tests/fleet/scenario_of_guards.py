@@ -9,7 +9,6 @@ jump, raise alarms, are stopped, and are switched off and on. What must hold: no
 from __future__ import annotations
 
 import asyncio
-import logging
 import math
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import AsyncExitStack, suppress
@@ -259,23 +258,8 @@ async def cancelled(_: Cell, __: str, arm: Magician, random: Random) -> None:
             await arm.move_to(*place(random), mode=random.choice(MODES))
 
 
-STEPS: list[Step] = [
-    move,
-    joints,
-    increment,
-    away,
-    batch,
-    path,
-    change,
-    change_on_the_way,
-    lift,
-    ride,
-    jog,
-    home,
-    stop,
-    alarm,
-]
-STEPS += [power, hold, cancelled, rest, together]
+STEPS: list[Step] = [move, joints, increment, away, batch, path, change, change_on_the_way, lift, ride, jog, home]
+STEPS += [stop, alarm, power, hold, cancelled, rest, together]
 WEIGHTS = [12, 5, 4, 8, 6, 3, 3, 3, 2, 4, 2, 1, 3, 2, 2, 3, 3, 8, 3]
 
 
@@ -386,6 +370,5 @@ def run_seed(
     async def scene() -> None:
         found.append(await run(seed, guard, say, stopped=stopped))
 
-    logging.getLogger("dobot_async").setLevel(logging.CRITICAL + 1)
     run_virtual(scene())
     return found[0]
