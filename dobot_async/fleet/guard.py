@@ -19,60 +19,25 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
 from typing import Generic, Literal, Protocol, TypeVar
 
 from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import DobotError
 from dobot_async.fleet.claims import Claim, Party
+from dobot_async.fleet.course import Course, Step
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.limits import Limits
 from dobot_async.fleet.paths import STEP
 from dobot_async.fleet.planner import Planner, Region, Stance
 from dobot_async.fleet.zones import Zones, here
 
-__all__ = ["Course", "Guard", "Mode", "Step"]
+__all__ = ["Guard", "Mode"]
 
 Mode = Literal["off", "wait", "raise"]
 S = TypeVar("S", bound=Stance)
 BETWEEN_READINGS = 0.1  # seconds
 AT_REST = 0.05  # mm between two readings of an arm that stands; the slowest of jogs comes further
 ROUNDING = 0.1  # mm; what numbers lose on the line, and an arc bulges between two places
-
-
-@dataclass(eq=False, slots=True)
-class Step:
-    """One command on its way.
-
-    Attributes:
-        motion: The command.
-        zones: What it leads through.
-        after: The zones in which it ends; None if that is not known, or if it leaves the arm where it is.
-    """
-
-    motion: Motion
-    zones: frozenset[str] = frozenset()
-    after: frozenset[str] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Course(Generic[S]):
-    """Several commands that are sent together, looked at before they are.
-
-    Attributes:
-        steps: Each of them.
-        end: Where the arm stands after them, if that is known.
-        moves: Whether one of them moves the arm, or changes its ways.
-    """
-
-    steps: Sequence[Step]
-    end: S | None
-    moves: bool
-
-    @property
-    def zones(self) -> frozenset[str]:
-        """What they lead through."""
-        return frozenset().union(*(step.zones for step in self.steps))
 
 
 class Stops(Protocol):

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import math
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager, nullcontext, suppress
-from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import anyio
 
@@ -18,56 +16,16 @@ from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.contract import LinkState
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.fleet.claims import Claim, Party, Pause
-from dobot_async.fleet.families import Family, FleetArm, FleetQueue, family_of
-from dobot_async.fleet.frames import BaseFrame
-from dobot_async.fleet.guard import Course, Guard, Mode, Step
+from dobot_async.fleet.course import Course, Step
+from dobot_async.fleet.families import Family, family_of
+from dobot_async.fleet.guard import Guard
 from dobot_async.fleet.limits import Limits
-from dobot_async.fleet.shapes import Box
+from dobot_async.fleet.member import Member
+from dobot_async.fleet.queue import FleetArm, FleetQueue
 from dobot_async.fleet.work import named
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Member", "Seat", "tell_to_stop"]
-
-A = TypeVar("A")
-
-
-@dataclass(frozen=True)
-class Member(Generic[A]):
-    """An arm that is to be in a fleet.
-
-    Attributes:
-        url: Where it is.
-        kind: Its class: Magician, MyCobot or UltraArm.
-        options: What `connect` of its class takes beside the URL, such as {"model": "myarm300"}.
-        base: Where it stands in the cell.
-        group: The name of its group; None for the whole fleet.
-        guard: "wait" lets its motions wait for zones that others hold, "raise" refuses them, "off" looks at none.
-        clearance: mm around the tool that have to stay out of such zones.
-        limits: Where in the cell its tool may be at all; None leaves it to the arm.
-        rail: For a Magician on a rail: the direction in which l grows, in degrees to the left of the arm's x axis, with
-            `base` where the arm stands at l = 0. None: a guarded arm refuses `l`.
-    """
-
-    url: str
-    kind: type[A]
-    options: Mapping[str, Any] = field(default_factory=dict)
-    base: BaseFrame = field(default_factory=BaseFrame)
-    group: str | None = None
-    guard: Mode = "off"
-    clearance: float = 0.0
-    limits: Box | None = None
-    rail: float | None = None
-
-    def __post_init__(self) -> None:
-        family = family_of(self.kind)
-        if self.guard not in {"off", "wait", "raise"} or not self.clearance >= 0:
-            raise ValueError('expected guard "off", "wait" or "raise", and clearance >= 0')
-
-        if self.limits and (family.name != "magician" or self.guard == "off"):
-            raise ValueError("limits are kept by the guard, and of a Magician alone: the ways of others are not known")
-
-        if self.rail is not None and (family.name != "magician" or not math.isfinite(self.rail)):
-            raise ValueError(f"rail is the direction of a Magician's rail in degrees, not {self.rail!r}")
 
 
 def tell_to_stop(seats: Iterable[Seat]) -> None:

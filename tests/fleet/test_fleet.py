@@ -12,8 +12,8 @@ from virtual import virtual
 
 from dobot_async import ArmAlarm, ConnectFailed, ConnectionLost, Fleet, Magician, MotionStopped, MyCobot, UltraArm
 from dobot_async.fleet import BarrierBroken, Member
-from dobot_async.fleet.families import FleetArm
 from dobot_async.fleet.fleet import OnFailure
+from dobot_async.fleet.queue import FleetArm
 from dobot_async.fleet.seat import Seat
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate

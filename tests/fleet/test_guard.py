@@ -158,11 +158,16 @@ async def test_the_ways_behind_a_queued_tool_are_those_of_the_tool() -> None:
 @virtual
 async def test_a_tool_that_changes_on_the_way_makes_the_way_unknown() -> None:
     async with cell(speed=1) as (fleet, _):
-        going = await fleet["a"].queue.move_to(*ASIDE, mode=PTPMode.JUMP_XYZ)
-        await asyncio.sleep(0.2)
+        first = await fleet["a"].queue.move_to(200, -150, 60)
+        second = await fleet["a"].queue.move_to(*OUT)
+        await asyncio.sleep(0.1)
+        assert fleet.holders("bin") == []
         await fleet["a"].request(c.SET_END_EFFECTOR_PARAMS, LONGER)
+        await first
+        await asyncio.sleep(0.1)
+        assert not second.done
         assert fleet.holders("bin") == ["a"]
-        await going
+        await second
         await asyncio.sleep(1)
         assert fleet.holders("bin") == []
 
