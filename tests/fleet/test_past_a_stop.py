@@ -10,14 +10,25 @@ import asyncio
 import os
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
-from itertools import count
+from itertools import count, cycle
 from typing import Any
 
 import pytest
 from steps import Steps
 from virtual import virtual
 
-from dobot_async import DobotError, Fleet, Jog, Magician, MotionStopped, PTPMode, SuctionCup
+from dobot_async import (
+    DobotError,
+    Fleet,
+    Jog,
+    Magician,
+    MotionStopped,
+    MyCobot,
+    PTPMode,
+    SuctionCup,
+    UltraArm,
+    UltraArmJog,
+)
 from dobot_async.fleet import BarrierBroken, BaseFrame, Box, Cylinder, Member
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate
@@ -28,7 +39,7 @@ HERE, THERE, IN = (200, -120, 40), (200, 120, 40), (270, 0, 40)
 LONGER = 0.15  # virtual seconds in which an arm that goes on would be seen to: half a minute of its own
 
 Cell = tuple[Fleet[Magician], Mapping[str, Simulation]]
-Scenario = Callable[[Fleet[Magician]], Coroutine[Any, Any, None]]
+Scenario = Callable[[Fleet[Any]], Coroutine[Any, Any, None]]
 
 
 @asynccontextmanager
@@ -131,11 +142,64 @@ SCENARIOS: list[Scenario] = [alone, each, together, batch, programs, download, j
 
 def stored(sim: Simulation) -> object:
     """The program in the arm's flash, as far as it has come."""
-    program = sim.arm.program
+    program = getattr(sim.arm, "program", None)
     return program and (id(program), len(program.commands))
 
 
-async def stopped_at(step: int, scenario: Scenario, fleet: Fleet[Magician], sims: Mapping[str, Simulation]) -> bool:
+@asynccontextmanager
+async def families(latency: float = 0.002) -> AsyncIterator[tuple[Fleet[Any], Mapping[str, Simulation]]]:
+    """An arm of each family."""
+    kinds = {"magician": ("magician", Magician, {}), "cobot": ("mycobot280", MyCobot, {"model": "mycobot280"})}
+    async with AsyncExitStack() as stack:
+        sims, members = {}, {}
+        for name, (simulated, kind, options) in {**kinds, "ultra": ("ultraarm", UltraArm, {})}.items():
+            faults = Faults(latency=latency)
+            sims[name] = await stack.enter_async_context(simulate(simulated, speed=50, faults=faults))
+            members[name] = Member[Any](sims[name].url, kind, options=options)
+
+        fleet: Fleet[Any] = await stack.enter_async_context(Fleet.connect(members))
+        await fleet.arm("cobot", MyCobot).power_on()
+        yield fleet, sims
+
+
+ways = cycle([-1, 1])
+
+
+async def of_families(fleet: Fleet[Any]) -> None:
+    way = next(ways)
+    async with fleet.together() as batches:
+        batches["magician"].move_to(220, 60 * way, 40)
+        batches["cobot"].move_joints(*([20 * way] * 6))
+        batches["ultra"].move_to(200, 40 * way, 100)
+
+    await batches.wait()
+
+
+async def jogs_of_families(fleet: Fleet[Any]) -> None:
+    async def jog(name: str, direction: object) -> None:
+        with suppress(MotionStopped):
+            await fleet[name].jog(direction, 0.01)
+
+    directions = {"magician": Jog.Y_PLUS, "cobot": "j1+", "ultra": UltraArmJog.X_PLUS}
+    await fleet.run({name: jog(name, way) for name, way in directions.items()})
+
+
+@pytest.mark.parametrize("scenario", [of_families, jogs_of_families], ids=lambda scenario: scenario.__name__)
+def test_families_at_each_step(scenario: Scenario) -> None:
+    @virtual
+    async def scene() -> None:
+        async with families() as (fleet, sims):
+            for step in count(1, 1 if ALL else 7):
+                if not await stopped_at(step, scenario, fleet, sims):
+                    assert step > 10
+                    break
+
+                await fleet.recover()
+
+    scene()
+
+
+async def stopped_at(step: int, scenario: Scenario, fleet: Fleet[Any], sims: Mapping[str, Simulation]) -> bool:
     """Stops a scenario at one of its steps; returns whether it has that many."""
     stops: list[asyncio.Task[Mapping[str, tuple[float, Any, Any]]]] = []
 
