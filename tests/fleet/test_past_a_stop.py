@@ -180,8 +180,7 @@ async def jogs_of_families(fleet: Fleet[Any]) -> None:
         with suppress(MotionStopped):
             await fleet[name].jog(direction, 0.01)
 
-    directions = {"magician": Jog.Y_PLUS, "cobot": "j1+", "ultra": UltraArmJog.X_PLUS}
-    await fleet.run({name: jog(name, way) for name, way in directions.items()})
+    await fleet.run({name: jog(name, direction) for name, direction in DIRECTIONS.items()})
 
 
 @pytest.mark.parametrize("scenario", [of_families, jogs_of_families], ids=lambda scenario: scenario.__name__)
@@ -249,22 +248,29 @@ def test_at_each_step(scenario: Scenario, latency: float) -> None:
     scene()
 
 
-@virtual
-async def test_a_jog_whose_begin_was_lost_is_not_repeated_behind_a_stop() -> None:
-    async with cell() as (fleet, sims):
-        arm, sim = fleet["left"], sims["left"]
-        jogging = asyncio.create_task(arm.jog(Jog.Y_PLUS, 1))
-        await asyncio.sleep(0)
-        sim.faults.loss = 1.0
-        await asyncio.sleep(0.001)
-        sim.faults.loss = 0.0
-        await arm.stop()
-        joints = sim.arm.device.joints
-        with pytest.raises(MotionStopped):
-            await jogging
+DIRECTIONS: Mapping[str, object] = {"magician": Jog.Y_PLUS, "cobot": "j1+", "ultra": UltraArmJog.X_PLUS}
 
-        await asyncio.sleep(LONGER)
-        assert sim.arm.device.joints == joints
+
+@pytest.mark.parametrize("name", DIRECTIONS)
+def test_a_jog_whose_begin_was_lost_is_not_repeated_behind_a_stop(name: str) -> None:
+    @virtual
+    async def scene() -> None:
+        async with families() as (fleet, sims):
+            arm, sim = fleet[name], sims[name]
+            jogging = asyncio.create_task(arm.jog(DIRECTIONS[name], 1))
+            await asyncio.sleep(0)
+            sim.faults.loss = 1.0
+            await asyncio.sleep(0.001)
+            sim.faults.loss = 0.0
+            await arm.stop()
+            joints = sim.arm.device.joints
+            with pytest.raises(MotionStopped):
+                await jogging
+
+            await asyncio.sleep(LONGER)
+            assert sim.arm.device.joints == joints
+
+    scene()
 
 
 @virtual
