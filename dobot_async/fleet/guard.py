@@ -87,6 +87,7 @@ class Guard(Generic[S]):
         self._claims: list[Claim] = []
         self._stance: S | None = None  # after all steps
         self._standing: frozenset[str] = frozenset()
+        self._inside: frozenset[str] = frozenset()  # those of them that it was really in when it was looked at last
         self._located = False
         self._loose: list[frozenset[str]] = []  # where the arm may be by what is no step: jogs, leftovers, changes
         self._mute = False  # whether it did not tell where it is when it was asked last
@@ -134,6 +135,9 @@ class Guard(Generic[S]):
             self._claims.append(claim)
 
         self._steps.extend(course.steps)
+        for step in course.steps:
+            self._planner.begun(step.motion.entry.value)
+
         if course.moves:
             self._plans += 1
             self._stance = course.end
@@ -188,6 +192,7 @@ class Guard(Generic[S]):
             return
 
         claim = await self.claim(self._zones_of(plan.region), None)
+        self._planner.begun(value)
         async with self._astray(claim):
             for step in self._steps:
                 if step.motion.moves:
@@ -265,8 +270,10 @@ class Guard(Generic[S]):
 
         self._mute = False
         if plans == self._plans and not self._loose:
+            self._planner.settled(stance)
             self._stance, self._located = stance, True
             self._standing = self._zones_of(stance.region)
+            self._inside = stance.region.zones(self._zones, self._base, ROUNDING)
             self._settle()
 
     async def watch_limits(self) -> str:
@@ -290,7 +297,8 @@ class Guard(Generic[S]):
         elif not self._busy:
             plans, seen = self._plans, await self._planner.look()
             if plans == self._plans and self._stance and self._stance.near(seen):
-                self._stance, self._standing = seen, self._zones_of(seen.region)
+                self._planner.settled(seen)
+                self._stance = seen
             else:
                 self.unsure()
 
@@ -339,9 +347,14 @@ class Guard(Generic[S]):
         return region.zones(self._zones, self._base, self._margin)
 
     def _settle(self) -> None:
-        """Hold what the arm is in or has ahead, and nothing else."""
-        needed = self._standing.union(*self._loose, *(step.zones for step in self._steps))
-        missing = needed.difference(*(claim.zones for claim in self._claims))
+        """Hold what the arm is in or has ahead, and nothing else.
+
+        A zone that another arm holds is not taken by who is only near it: who holds a zone may move in it.
+        """
+        ahead = frozenset[str]().union(*self._loose, *(step.zones for step in self._steps))
+        others = (claim.zones for claim in self._zones.claims.held if claim.party is not self._party)
+        needed = ahead | self._standing
+        missing = (ahead | self._inside & self._standing | self._standing.difference(*others)) - self.holds
         if missing:
             claim = Claim(self._party, frozenset([self._party]), missing)
             self._claims.append(claim)

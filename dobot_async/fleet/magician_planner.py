@@ -27,7 +27,8 @@ __all__ = ["MagicianPlanner", "MagicianStance"]
 Q = TypeVar("Q")
 R = TypeVar("R")
 RAIL_LENGTH = 1000.0  # mm
-SAME = 1.0  # mm and degrees that an arm may stand off from where it was to stand
+SAME = 0.3  # mm and degrees that an arm may stand off from where it was to stand
+SAME_TOOL = 0.01  # mm
 Span = tuple[float, float]
 
 
@@ -104,7 +105,7 @@ class MagicianPlanner:
     def __init__(self, arm: Asked, heading: float | None) -> None:
         self._arm = arm
         self._heading = heading
-        self._said: c.EndEffectorParams | None = None
+        self._said: list[c.EndEffectorParams] = []  # one of these is on the arm
         self._bias = c.EndEffectorParams(0.0)
         self._longest = 0.0  # mm from the wrist, of all end effectors so far
 
@@ -156,6 +157,16 @@ class MagicianPlanner:
 
         return self._change_tool(value, start) if isinstance(value, c.EndEffectorParams) else None
 
+    def begun(self, value: object) -> None:
+        """Take note that a command is on its way: an end effector that the program says is on the arm from now on."""
+        if isinstance(value, c.EndEffectorParams):
+            self._said.append(value)
+
+    def settled(self, stance: MagicianStance) -> None:
+        """Take note of the end effector that the arm was told of last, unless it has forgotten it."""
+        if not self._said or self._is_said(stance.bias):
+            self._said = [stance.bias]
+
     def reach(self, stance: MagicianStance | None) -> Region:
         """Return where the arm may come on ways that are not known: all around, and all along its rail."""
         bias = stance.bias if stance else c.EndEffectorParams(0.0)
@@ -192,15 +203,13 @@ class MagicianPlanner:
 
     def _change_tool(self, bias: c.EndEffectorParams, start: MagicianStance | None) -> Plan[MagicianStance]:
         """Another end effector: the tool is elsewhere, though nothing has moved."""
-        before, self._said = self._said, bias
         self._longest = max(self._longest, math.hypot(*numbers(bias)))
         if start is None:
             return Plan(self.reach(start), None, ())
 
         end = replace(start, bias=bias, slack=0.0)
-        slack = max(start.slack, math.dist(numbers(before or start.bias), numbers(start.bias)))
         places = [stance.kinematics.forward(*start.joints)[:3] for stance in (start, end)]
-        return Plan(replace(start, slack=slack).along(places, start.rail), end, ())
+        return Plan(start.along(places, start.rail), end, ())
 
     def _goal(self, value: object, rail: Span | None) -> Sequence[XYZ] | None:
         """Where a way that is not known ends, if that is given; none for what limits do not concern."""
@@ -213,7 +222,7 @@ class MagicianPlanner:
         elif target is None:
             return None
         elif target.joints:
-            place = kinematics_of(self._said or self._bias).forward(*target.numbers)[:3]
+            place = kinematics_of(self._said[-1] if self._said else self._bias).forward(*target.numbers)[:3]
         else:
             place = target.numbers[:3]
 
@@ -240,8 +249,15 @@ class MagicianPlanner:
         return (place, place) if math.isfinite(place) else (0.0, RAIL_LENGTH)
 
     def _slack(self, bias: c.EndEffectorParams) -> float:
-        """How far the tool may be from where the arm believes it is."""
-        return math.dist(numbers(self._said or bias), numbers(bias))
+        """How far the tool may be from where the arm believes it is: it has forgotten what was said last."""
+        if not self._said or self._is_said(bias):
+            return 0.0
+
+        return max(math.dist(numbers(each), numbers(bias)) for each in self._said)
+
+    def _is_said(self, bias: c.EndEffectorParams) -> bool:
+        """Whether an end effector is one that the program has said."""
+        return any(math.dist(numbers(each), numbers(bias)) < SAME_TOOL for each in self._said)
 
 
 JUMPS = (c.PTPMode.JUMP_XYZ, c.PTPMode.JUMP_ANGLE, c.PTPMode.JUMP_MOVL_XYZ)

@@ -125,6 +125,12 @@ class Planner(Protocol[S]):
     def change(self, value: object, start: S | None) -> Plan[S] | None:
         """Return what a command does that moves nothing: where the tool is then; None if it changes no way."""
 
+    def begun(self, value: object) -> None:
+        """Take note that a command is on its way to the arm."""
+
+    def settled(self, stance: S) -> None:
+        """Take note that the arm has nothing to do, and how it was seen then."""
+
     def reach(self, stance: S | None) -> Region:
         """Return where the arm may come on ways that are not known."""
 
@@ -170,6 +176,12 @@ class Unplanned:
 
     def change(self, value: object, start: Somewhere | None) -> None:
         """Return None: as no way is known, none changes."""
+
+    def begun(self, value: object) -> None:
+        """Do nothing."""
+
+    def settled(self, stance: Somewhere) -> None:
+        """Do nothing."""
 
     def reach(self, stance: Somewhere | None) -> Region:  # noqa: ARG002
         """Return everywhere."""

@@ -135,6 +135,25 @@ def test_another_tool_waits_for_the_zone_that_it_would_stick_out_into(how: str) 
 
 
 @virtual
+async def test_a_tool_that_was_refused_leaves_nothing_behind() -> None:
+    async with cell(guard="raise", at={"a": (225, 0, 40), "b": IN}) as (fleet, sims):
+        with pytest.raises(ZoneOccupied):
+            await fleet["a"].set_end_effector(LONGER)
+
+        with pytest.raises(ZoneOccupied):
+            await fleet["a"].queue.put(c.SET_END_EFFECTOR_PARAMS, LONGER)
+
+        await fleet["a"].move_by(0, 0, 1)
+        await fleet["a"].stop()
+        await fleet["a"].move_by(0, 0, 1)
+        assert fleet.holders("bin") == ["b"]
+        with pytest.raises(ZoneOccupied):
+            await fleet["a"].move_to(*IN)
+
+        assert not inside(sims["a"])
+
+
+@virtual
 async def test_the_ways_behind_a_queued_tool_are_those_of_the_tool() -> None:
     async with cell(guard="raise") as (fleet, sims):
         joints = (0, 15, 30, 0)  # with the short tool in front of the bin, with the long one in it
