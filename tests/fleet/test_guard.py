@@ -485,6 +485,19 @@ async def test_an_arm_that_was_led_by_hand_is_looked_at_before_it_moves() -> Non
 
 
 @virtual
+async def test_who_stands_beside_a_zone_that_another_arm_holds_may_not_move_into_it() -> None:
+    async with cell(guard="raise", at={"a": OUT, "b": IN}) as (fleet, sims):
+        sims["a"].arm.guide_to(BIN.x[0] - 1.5, 0, 40)
+        with pytest.raises(ZoneOccupied, match="b holds zone bin"):
+            await fleet["a"].move_to(*IN)
+
+        assert fleet.holders("bin") == ["b"]
+        await fleet["b"].move_to(*ASIDE)
+        await asyncio.sleep(0.1)
+        await fleet["a"].move_to(*IN)
+
+
+@virtual
 async def test_a_zone_ahead_of_an_arm_is_kept_until_it_has_heard_its_stop() -> None:
     async with cell(speed=1) as (fleet, sims):
         await fleet["a"].set_speed(1)
