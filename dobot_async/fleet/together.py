@@ -111,7 +111,8 @@ def abandon(batches: Mapping[str, Collected]) -> None:
     """Ends the Motions of batches that were not sent."""
     for batch in batches.values():
         for motion in batch.motions:
-            motion.end(MotionStopped("it was not sent: the block that starts the arms together was left by an error"))
+            if motion.call is None:
+                motion.end(MotionStopped("it was not sent: the block that starts the arms together ended by an error"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,21 +152,24 @@ class Launch:
             await side_by_side({name: seat.queue.join(self.timeout) for name, seat in seats.items()})
             self.check()
             motions = {name: self.batches[name].motions for name in seats}
+            for seat in seats.values():
+                seat.quiet(True)  # what is admitted cannot be watched before it is sent
+
             try:
                 await admit_together(seats, motions, self.zones, self.timeout)
                 self.check()
                 latency = await side_by_side({name: measure(seat) for name, seat in seats.items()})
                 return await self._start(latency)
             except BaseException as error:
+                abandon(self.batches)  # before anybody watches them
                 await on_the_way_out(error, give_up(seats))
                 raise
+            finally:
+                self._watch()
 
     async def _start(self, latency: Mapping[str, float]) -> Start:
         """Loads what the arms take while they are paused, starts them, and sends the rest."""
         seats = self.seats
-        for seat in seats.values():
-            seat.quiet(True)
-
         try:
             pausing = {name: seat for name, seat in seats.items() if seat.family.pauses}
             await side_by_side({name: seat.queue.pause() for name, seat in pausing.items()})
@@ -183,12 +187,16 @@ class Launch:
                 {name: self._release(name, instant - latency[name], first[name]) for name in seats}
             )
         finally:
-            for seat in seats.values():
-                seat.quiet(False)
+            self._watch()
 
         await side_by_side({name: self._put(name, more) for name, more in rest.items() if more})
         at = {name: (sent + answered) / 2 for name, (sent, answered) in told.items()}
         return Start(at, latency, max(answered - sent for sent, answered in told.values()) / 2)
+
+    def _watch(self) -> None:
+        """Has the arms watched again."""
+        for seat in self.seats.values():
+            seat.quiet(False)
 
     async def _put(self, name: str, motions: Sequence[Motion]) -> None:
         """Sends motions that were admitted."""

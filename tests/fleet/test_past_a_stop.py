@@ -7,6 +7,7 @@ them: on slow links, and in longer programs.
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
@@ -238,12 +239,17 @@ async def stopped_at(step: int, scenario: Scenario, fleet: Fleet[Any], sims: Map
 def test_at_each_step(scenario: Scenario, latency: float) -> None:
     @virtual
     async def scene() -> None:
+        broken: list[object] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: broken.append(context))
         async with cell(latency) as (fleet, sims):
             for step in count(1):
                 place(sims)
                 if not await stopped_at(step, scenario, fleet, sims):
                     assert step > 10
                     break
+
+        gc.collect()
+        assert not broken, "a task of the driver died"
 
     scene()
 
