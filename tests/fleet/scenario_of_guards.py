@@ -310,7 +310,7 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
         for name, stand in stands.items():
             faults = Faults(latency=random.choice([0.0, 0.003, 0.02]), loss=random.choice([0.0, 0.0, 0.02]))
             sims[name] = sim = await stack.enter_async_context(
-                simulate(speed=SPEED, seed=random.randrange(1 << 30), faults=faults)
+                simulate(speed=SPEED, seed=random.randrange(1 << 30), faults=faults, homed=True)
             )
             sim.arm.guide_to(*AWAY)
             keep = random.random() < 0.3 and not any(each.options["queue"] == "keep" for each in members.values())

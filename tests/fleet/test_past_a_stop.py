@@ -155,7 +155,8 @@ async def families(latency: float = 0.002) -> AsyncIterator[tuple[Fleet[Any], Ma
         sims, members = {}, {}
         for name, (simulated, kind, options) in {**kinds, "ultra": ("ultraarm", UltraArm, {})}.items():
             faults = Faults(latency=latency)
-            sims[name] = await stack.enter_async_context(simulate(simulated, speed=50, faults=faults))
+            homed: dict[str, Any] = {} if simulated == "mycobot280" else {"homed": True}
+            sims[name] = await stack.enter_async_context(simulate(simulated, speed=50, faults=faults, **homed))
             members[name] = Member[Any](sims[name].url, kind, options=options)
 
         fleet: Fleet[Any] = await stack.enter_async_context(Fleet.connect(members))
