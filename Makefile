@@ -1,8 +1,9 @@
 # make demo      a pick-and-place cycle on the built-in simulator, over a real pseudo-terminal
 # make test      ruff, mypy and the whole test suite
 # make test-all  the test suite on every Python from 3.11 on that this machine has
+# make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
 # make format    what ruff can mend
-# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell]
+# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|stops]
 # make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 
@@ -10,7 +11,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all check pytest format clean fuzz promises soak
+.PHONY: demo test test-all test-minimum check pytest format clean fuzz promises soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
@@ -37,6 +38,16 @@ test-all:
 	    fi; \
 	done
 
+# What pyproject.toml declares is taken at its lowest, what that needs in turn as pip would.
+test-minimum: .venv-minimum/.dev
+	.venv-minimum/bin/python -m pytest -n auto
+
+.venv-minimum/.dev: pyproject.toml
+	$(PYTHON) -m venv --clear .venv-minimum
+	.venv-minimum/bin/python -m pip install --quiet --disable-pip-version-check uv
+	.venv-minimum/bin/uv pip install --quiet --python .venv-minimum/bin/python --resolution lowest-direct --editable '.[dev,fuzz]'
+	touch $@
+
 pytest: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto
 
@@ -51,6 +62,7 @@ ANSWERS ?= 200000
 
 promises: $(VENV)/.dev
 	PROMISES=all $(BIN)/python -m pytest -n auto tests/promises
+	MOMENTS=all $(BIN)/python -m pytest -n auto tests/fleet/test_past_a_stop.py
 	$(BIN)/python -W ignore tests/promises/stale.py --answers $(ANSWERS)
 
 # Guided by coverage if the extra `fuzz` (atheris) is installed.
@@ -73,4 +85,4 @@ $(VENV)/.dev: $(VENV)/.venv pyproject.toml
 	touch $@ $(VENV)/.cli
 
 clean:
-	rm -rf .venv .venv-3.* build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-minimum .venv-3.* build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis

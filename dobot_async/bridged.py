@@ -16,7 +16,7 @@ from dobot_async._core.link.link import Link
 from dobot_async.contract import Encoder, Frame, Parser
 from dobot_async.transports import Transport
 
-__all__ = ["Bridged", "ByKey", "Kind", "Reading", "Watch"]
+__all__ = ["Bridged", "ByKey", "Kind", "Reading", "Switch", "Watch"]
 
 F = TypeVar("F", bound=Frame)
 
@@ -29,7 +29,9 @@ class Kind(enum.Enum):
     WRITE = "write"
     """Changes something, or moves the arm; one program at a time may send it."""
     STOP = "stop"
-    """Makes the arm stop; anybody may send it, and it goes ahead of everything."""
+    """Makes the arm stop; anybody may send it, and it goes ahead of everything. What waits to be written is dropped."""
+    OFF = "off"
+    """Switches off what burns or turns; anybody may send it, and it goes ahead of everything. Nothing else changes."""
 
 
 class Watch(Protocol[F]):
@@ -47,6 +49,48 @@ class Watch(Protocol[F]):
 
     def moving(self, reply: F | None) -> bool:
         """Returns whether the arm is, or may be, in the middle of what it was told; `reply` is that to the question."""
+
+    def off(self) -> Sequence[F]:
+        """Returns what ends, beside `Bridged.stopping`, what the program may have switched on."""
+
+
+class Switch:
+    """Whether something that burns or turns is on, as far as the arm can have executed what it was told.
+
+    Where that is not known it counts as on. What was sent last says little: a queued "on" may be executed after an
+    immediate "off", and a queued "off" may be thrown away with the queue.
+
+    1. Any "on" counts from the moment that it is sent.
+    2. A queued "off" counts when the queue has been executed to its end, unless an "on" came behind it, or the queue
+       was emptied meanwhile.
+    3. An immediate "off" counts when it was answered, unless a queued "on" may still come.
+    """
+
+    def __init__(self) -> None:
+        self._on = False
+        self._may_come = False
+        self._off_behind = False
+
+    def switch_on(self, *, queued: bool) -> None:
+        """An "on" is sent."""
+        self._on = True
+        self._may_come = self._may_come or queued
+        self._off_behind = False
+
+    def switch_off(self, *, queued: bool) -> None:
+        """An "off" was acknowledged."""
+        if queued:
+            self._off_behind = True
+        elif not self._may_come:
+            self._on = False
+
+    def empty(self) -> None:
+        """The queue was emptied: of what was queued nobody knows what has been executed."""
+        self._may_come = self._off_behind = False
+
+    def is_on(self, *, finished: bool) -> bool:
+        """Returns whether it is, or may be, on; `finished` says that the queue has been executed to its end."""
+        return self._on and not (finished and self._off_behind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +168,9 @@ class Bridged(Protocol[F]):
     def requests(self) -> Parser[F]:
         """Returns a parser for what a client sends."""
 
+    def begins(self, data: bytes) -> bool | None:
+        """Returns whether bytes are how a client's first request begins; None while too few of them are there."""
+
     def attach(self, link: Link[F], parser: Parser[F]) -> None:
         """Called with a new link to the arm, and the parser of what it sends."""
 
@@ -165,6 +212,8 @@ class ByKey(ABC, Generic[F]):
     """A family whose answers tell by their keys whose they are, and which has no word for a refusal."""
 
     in_order = False
+    header: bytes
+    """What each frame begins with."""
     stopping: Sequence[F] = ()
 
     @property
@@ -179,6 +228,13 @@ class ByKey(ABC, Generic[F]):
     def requests(self) -> Parser[F]:
         """Returns a parser for what a client sends, which looks like what the arm sends."""
         return self.parser()
+
+    def begins(self, data: bytes) -> bool | None:
+        """Returns whether bytes begin with the header of a frame; None while they are a part of it."""
+        if len(data) < len(self.header):
+            return None if self.header.startswith(data) else False
+
+        return data.startswith(self.header)
 
     def attach(self, link: Link[F], parser: Parser[F]) -> None:
         """The parser needs to know of nothing."""

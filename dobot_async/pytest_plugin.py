@@ -38,7 +38,7 @@ FAULTS = (
     *("loss", "corrupt", "dup", "split", "noise", "merge", "stall", "late", "silence"),
     *("latency", "jitter", "reorder", "stall_time", "late_time", "silence_time"),
 )
-SETTINGS = ("listen", "model", "line", "mount", "speed", "seed", "options", "quirks", "limits")
+SETTINGS = ("listen", "model", "line", "mount", "speed", "seed", "options", "quirks", "limits", "homed")
 MARK = f"dobot({', '.join(f'{name}=...' for name in (*SETTINGS, *FAULTS))}): what simulated arm the fixtures give"
 
 

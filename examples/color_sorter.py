@@ -1,19 +1,19 @@
 """Sorts pieces from a conveyor belt by colour, with infrared and colour sensors of the second version (V2).
 
-On a real arm, whose URL is the argument: home it, and set the places to yours. The belt is on stepper 1, the infrared
-sensor on GP4, and the colour sensor, which looks up at the piece in the cup, on GP2.
+On a real arm, whose URL is the argument: home it, and set the places to yours. The belt is on stepper 1 (motor 0), the
+infrared sensor on GP4, and the colour sensor, which looks up at the piece in the cup, on GP2.
 """
 
 import asyncio
 import sys
 
-from dobot_async import ColorPort, InfraredPort, Magician, PTPMode, SuctionCup
-from dobot_async.magician import commands as c
+from dobot_async import AccessoryVersion, ColorPort, InfraredPort, Magician, PTPMode, SuctionCup
 
 URL = sys.argv[1] if len(sys.argv) > 1 else "sim:?speed=50"
 BELT, LOOK = (220, 120, 0), (200, -60, -40)  # where a piece is taken, and where it is looked at, mm
-BOXES = {(1, 0, 0): (120, -200, -10), (0, 1, 0): (190, -150, -10), (0, 0, 1): (240, -60, -10)}  # dropped into
-STEP, STEPS = 800, 40  # pulses, about 5 mm; after 200 mm without a piece there are no more
+BOXES = {"red": (120, -200, -10), "green": (190, -150, -10), "blue": (240, -60, -10)}  # dropped into
+STEP, STEPS = 5, 40  # mm; after 200 mm without a piece there are no more
+PULSES_PER_MM = 160  # measure yours
 
 
 async def next_piece(arm: Magician) -> bool:
@@ -21,7 +21,7 @@ async def next_piece(arm: Magician) -> bool:
     for _ in range(STEPS):
         if await arm.get_infrared(InfraredPort.GP4):
             return True
-        await arm.conveyor(8000, distance=STEP)
+        await arm.conveyor_mm(50, pulses_per_mm=PULSES_PER_MM, distance=STEP)
     return False
 
 
@@ -36,14 +36,14 @@ async def main() -> None:
     """Sorts until the belt is empty."""
     async with Magician.connect(URL) as arm:
         await arm.set_end_effector(SuctionCup())
-        await arm.request(c.SET_INFRARED_SENSOR, c.InfraredSensor(True, InfraredPort.GP4, c.AccessoryVersion.V2))
-        await arm.request(c.SET_COLOR_SENSOR, c.ColorSensor(True, ColorPort.GP2, c.AccessoryVersion.V2))
+        await arm.set_infrared_sensor(InfraredPort.GP4, version=AccessoryVersion.V2)
+        await arm.set_color_sensor(ColorPort.GP2, version=AccessoryVersion.V2)
         while await next_piece(arm):
             await reach(arm, BELT, suck=True)
             await arm.move_to(*LOOK, mode=PTPMode.JUMP_XYZ)
-            color = await arm.get_color()
-            await reach(arm, BOXES[color.r, color.g, color.b], suck=False)
-            print(f"sorted a piece of {color}")
+            color = await arm.wait_for_color(timeout=5)
+            await reach(arm, BOXES[color.name], suck=False)
+            print(f"sorted a {color.name} piece")
 
 
 asyncio.run(main())

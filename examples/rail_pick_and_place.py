@@ -20,10 +20,10 @@ async def reach(arm: Magician, x: float, y: float, rail: float, *, suck: bool) -
     """Drives to a place on the rail, goes down, sucks or lets go, and comes up again."""
     async with arm.queue.batch() as batch:
         batch.move_to(x, y, UP, l=rail)
-        batch.move_to(x, y, DOWN, l=rail, mode=PTPMode.MOVL_XYZ)
+        batch.move_to(z=DOWN, mode=PTPMode.MOVL_XYZ)
         batch.suction(suck)
         batch.wait(0.3)
-        lifted = batch.move_to(x, y, UP, l=rail, mode=PTPMode.MOVL_XYZ)
+        lifted = batch.move_to(z=UP, mode=PTPMode.MOVL_XYZ)
     await lifted
 
 

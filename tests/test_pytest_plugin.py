@@ -116,6 +116,11 @@ async def test_an_ultraarm(faulty_arm):
         await arm.move_joints(10, 20, 30)
     assert faulty_arm.arm.angles.j1 == pytest.approx(10, abs=0.1)
 
+@pytest.mark.dobot(homed=True)
+async def test_homed(simulated_arm, simulate_arm):
+    unhomed = await simulate_arm(homed=False)
+    assert (simulated_arm.arm.homed, unhomed.arm.homed) == (True, False)
+
 async def test_all(simulate_arm):
     arms = [await simulate_arm(model) for model in ("magician", "myarm300", "ultraarm")]
     assert len({each.url for each in arms}) == 3
@@ -150,7 +155,7 @@ def test_arms_stand_in_the_scene_of_the_suite(tmp_path: Path) -> None:
 
 
 def test_all_families_are_served(tmp_path: Path) -> None:
-    assert passed(run(tmp_path, FAMILIES_SUITE)) == 3
+    assert passed(run(tmp_path, FAMILIES_SUITE)) == 4
 
 
 def test_auto_mode_needs_no_mark(tmp_path: Path) -> None:

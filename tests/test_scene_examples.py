@@ -66,7 +66,7 @@ async def test_the_sorter_puts_each_piece_into_the_box_of_its_colour() -> None:
 async def test_the_rail_carries_each_piece_to_its_place() -> None:
     places = [(200, -60), (230, 0), (200, 60)]
     scene = Scene(pieces=[Piece(str(n), (x, y + 100)) for n, (x, y) in enumerate(places)])
-    await run(scene, "rail_pick_and_place.py")
+    await run(scene, "rail_pick_and_place.py", mount=Mount(rail_yaw=90))
     for n, (x, y) in enumerate(places):
         assert scene.pieces[str(n)].position == pytest.approx((x, y + 700, -138), abs=0.1)
 

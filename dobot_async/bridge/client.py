@@ -17,7 +17,7 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable, Hashable
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from dobot_async._core.link.admission import Admission
 from dobot_async.bridge.desk import Desk, Refused, Request
@@ -82,6 +82,7 @@ class Client(Generic[F]):
         self._bytes = Allowance(limits.data, self._loop.time)
         self._frames = Allowance(limits.frames, self._loop.time)
         self._room = asyncio.Semaphore(AT_ONCE)
+        self._order = asyncio.Lock()
         self._news = asyncio.Event()
         self._held = False
         self._junk = 0
@@ -92,7 +93,7 @@ class Client(Generic[F]):
         self._requests: set[asyncio.Task[None]] = set()
         self._writing: asyncio.Task[None] | None = None
         self._unsent: dict[Hashable, Request[F]] = {}
-        self._stopping: set[Any] = set()
+        self._stopping: set[bytes] = set()
         self._unanswered: deque[Request[F]] = deque()
         self._work = self._loop.create_task(self._run(), name=f"dobot_async bridge {name}")
         self._work.add_done_callback(self._ended)
@@ -131,11 +132,27 @@ class Client(Generic[F]):
         self.gone = self.left = True
         self._work.cancel()
 
+    async def take_turn(self, request: Request[F]) -> None:
+        """Waits until what the client has asked before is on the arm's line.
+
+        The arm answers in order, and so the client is answered: it takes an answer that comes in front of another one
+        for the proof that the other one was lost.
+        """
+        await self._order.acquire()
+        request.in_turn = True
+
+    def end_turn(self, request: Request[F]) -> None:
+        """A request is sent now, or will never be; may be called again."""
+        if request.in_turn:
+            request.in_turn = False
+            self._order.release()
+
     def sending(self, request: Request[F]) -> None:
         """A read is sent now: what is repeated from here on is asked anew."""
         if self.gone:
             raise Refused("the client has gone")
 
+        self.end_turn(request)
         self._forget(request)
 
     async def settled(self) -> None:
@@ -203,11 +220,11 @@ class Client(Generic[F]):
                 continue
 
             self._unsent.clear()
-            subject = self._family.subject(frame)
+            stop = bytes(frame)
             if request.kind is Kind.WRITE:
                 self._take(request)
-            elif subject not in self._stopping:
-                self._stopping.add(subject)
+            elif stop not in self._stopping:
+                self._stopping.add(stop)
                 request.ahead = True
                 self._take(request)
             elif self._family.in_order:
@@ -215,13 +232,13 @@ class Client(Generic[F]):
                 self._take(request)
 
     def _ask(self, request: Request[F]) -> None:
-        """Lets a read wait, or joins it with the last one of its key if that is the same and waits as well."""
+        """Lets a read wait, or joins it with the one before it if that is the same and waits as well."""
         last = self._unsent.get(request.frame.key)
         if last and last.frame == request.frame and last.times < MOST_TIMES:
             last.times += 1
             self._frames.spend(1)
         else:
-            self._unsent[request.frame.key] = request
+            self._unsent = {request.frame.key: request}
             self._take(request)
 
     def _take(self, request: Request[F]) -> None:
@@ -277,7 +294,7 @@ class Client(Generic[F]):
         finally:
             self._forget(request)
             if request.ahead:
-                self._stopping.discard(self._family.subject(request.frame))
+                self._stopping.discard(bytes(request.frame))
             else:
                 self._room.release()
 

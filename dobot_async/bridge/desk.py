@@ -31,6 +31,7 @@ class Request(Generic[F]):
         times: How often it came before it was sent.
         ahead: Whether it went ahead of what its client had sent before.
         answer: What the client is told, None until that is known.
+        in_turn: Whether what its client sent behind it waits until it is sent.
     """
 
     frame: F
@@ -39,6 +40,7 @@ class Request(Generic[F]):
     times: int = 1
     ahead: bool = False
     answer: bytes | None = None
+    in_turn: bool = False
 
 
 class Desk(Protocol[F]):

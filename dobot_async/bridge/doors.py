@@ -7,15 +7,12 @@
     ws           a header (Authorization: Bearer), ?token= in the URL, or the line as the first text message
 
 A token is needed on every address but this computer's own. Without one a web page must not get through to the arm,
-either: browsers send what any page likes to this computer's ports.
+either: browsers send what any page likes to this computer's ports. `handshake` has what tcp and ws share.
 """
 
 from __future__ import annotations
 
-import asyncio
-import hmac
 import ipaddress
-import re
 import secrets
 import ssl
 from collections.abc import Callable, Collection, Sequence
@@ -25,40 +22,26 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
+from dobot_async.bridge.handshake import (
+    LONGEST_LINE,
+    TOKEN,
+    Authenticator,
+    Handshakes,
+    PendingConnection,
+    TokenHandshake,
+)
 from dobot_async.bridge.service import Bridge
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.listen import Host, Peer, on_tcp, on_udp
+from dobot_async.transports import hidden
+from dobot_async.transports.base import MANY
+from dobot_async.transports.listen import on_tcp, on_udp
+from dobot_async.transports.network import TOKEN as TOKEN_OPTION
 from dobot_async.transports.network import secret
 from dobot_async.transports.terminal import on_pty
 
-__all__ = ["Doors", "Guard", "open_doors"]
+__all__ = ["Doors", "open_doors"]
 
 FORMS = "tcp://127.0.0.1:0, udp://127.0.0.1:0, ws://127.0.0.1:0, zenoh://name or pty"
-TOKEN = b"TOKEN "
-LONGEST_LINE = 256
-FIRST_LINE = 5.0  # seconds
-STRANGERS = 32  # connections that have not said their token yet
-HTTP = re.compile(rb"[A-Z]{3,8} /")
-PERHAPS_HTTP = re.compile(rb"[A-Z]{0,8} ?")
-
-
-@dataclass(frozen=True, slots=True)
-class Guard:
-    """Who is let in.
-
-    Attributes:
-        token: What has to be presented; None lets everybody in.
-        origins: Web pages that may come without.
-        refuse: Called with who was not let in, and why.
-    """
-
-    token: str | None
-    origins: frozenset[str]
-    refuse: Callable[[str, str], None]
-
-    def knows(self, token: str) -> bool:
-        """Whether this is the token, in the same time whatever it is."""
-        return self.token is None or hmac.compare_digest(token.encode(errors="surrogateescape"), self.token.encode())
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +85,7 @@ class Doors:
         try:
             token = secret(token) if token is not None else None
         except ValueError:
-            raise ValueError("a token is one word of printable ASCII characters") from None
+            raise ValueError(f"expected as the token {TOKEN_OPTION.expected}") from None
 
         if token is None and not all(local(place) for place in places):
             token = secrets.token_urlsafe(24)
@@ -117,32 +100,44 @@ async def open_doors(
 
     `refuse` is called with who was not let in, and why.
     """
-    guard = Guard(doors.token, doors.origins, refuse)
+    authenticator = Authenticator(doors.token, doors.origins, host.family.begins, refuse)
     urls = []
     for place in doors.places:
         address, port = place.hostname or "", place.port or 0
         try:
             if place.scheme == "pty":
                 urls.append(await on_pty(host, stack, lasting=False))
-            elif place.scheme == "tcp":
-                reception = Reception(host, guard)
-                urls.append(await on_tcp(reception, stack, address=address, port=port, tls=doors.tls))
-                stack.callback(reception.close)
             elif place.scheme == "udp":
-                known = Datagrams(guard)
-                urls.append(await on_udp(host, stack, address=address, port=port, admit=known.admit, evict=False))
+                known = Datagrams(authenticator)
+                urls.append(
+                    await on_udp(host, stack, address=address, port=port, admit=known.admit, crowded=known.crowded)
+                )
             elif place.scheme == "zenoh":
                 from dobot_async.bridge.zenoh import on_zenoh  # noqa: PLC0415 - it needs an extra
 
                 urls.append(await on_zenoh(host, stack, place))
             else:
-                from dobot_async.bridge.websocket import on_ws  # noqa: PLC0415 - it needs an extra
-
-                urls.append(await on_ws(host, stack, guard, address=address, port=port, tls=doors.tls))
+                handshakes = Handshakes(host, authenticator, kind_of(place.scheme))
+                scheme = "tcp" if place.scheme == "tcp" else "ws"
+                tls = doors.tls
+                urls.append(await on_tcp(handshakes, stack, address=address, port=port, tls=tls, scheme=scheme))
+                stack.callback(handshakes.close)
         except OSError as error:
             raise ConnectFailed(f"cannot listen at {place.geturl()}: {error}") from error
 
     return tuple(urls)
+
+
+def kind_of(scheme: str) -> type[PendingConnection]:
+    """What a connection to a port is; raises ConnectFailed where a package is missing for it."""
+    if scheme == "tcp":
+        return TokenHandshake
+
+    from dobot_async.bridge.websocket import WebSocketConnection  # noqa: PLC0415 - it needs an extra
+    from dobot_async.transports.websocket import websockets  # noqa: PLC0415 - as above
+
+    websockets("server")
+    return WebSocketConnection
 
 
 def place_of(listen: str) -> SplitResult:
@@ -156,10 +151,12 @@ def place_of(listen: str) -> SplitResult:
             return place
 
         known = place.scheme in {"tcp", "udp", "ws", "wss"}
-        if known and place.hostname and place.port is not None and not (place.path.strip("/") or place.query):
+        host = (place.hostname or "").encode("idna")  # a ValueError if nobody can have this name
+        bare = not (place.path.strip("/") or place.query or place.fragment or "@" in place.netloc)
+        if known and host and b"\0" not in host and place.port is not None and bare:
             return place
 
-    raise ValueError(f"cannot listen at {listen!r}; use {FORMS}")
+    raise ValueError(f"cannot listen at {hidden(listen)!r}; use {FORMS}")
 
 
 def local(place: SplitResult) -> bool:
@@ -188,132 +185,23 @@ def served_with(certificate: str | Path, key: str | Path | None) -> ssl.SSLConte
 class Datagrams:
     """Finds the token in datagrams."""
 
-    def __init__(self, guard: Guard) -> None:
-        self._guard = guard
-        self._complained = -1e9
+    def __init__(self, authenticator: Authenticator) -> None:
+        self._authenticator = authenticator
 
     def admit(self, data: bytes, known: bool) -> bytes | None:
         """Returns what is in a datagram besides the token, None if its sender is not let in."""
+        authenticator = self._authenticator
         line, end, rest = data.partition(b"\n")
         if line.startswith(TOKEN) and end and len(line) <= LONGEST_LINE:
-            if self._guard.knows(line.removeprefix(TOKEN).decode("latin-1").strip()):
+            if authenticator.knows(line.removeprefix(TOKEN)):
                 return rest
-        elif known or self._guard.token is None:
+        elif known or (authenticator.token is None and authenticator.begins(data) is not False):
             return data
 
-        # Datagrams cost their sender nothing: one line a second tells enough.
-        now = asyncio.get_running_loop().time()
-        if now > self._complained + 1:
-            self._complained = now
-            self._guard.refuse("udp", "a datagram of a stranger with a wrong token, or none")
-
+        reason = "a wrong token, or none" if authenticator.token else "what it says is nothing that this arm is told"
+        authenticator.refuse("udp", f"a datagram of a stranger: {reason}")
         return None
 
-
-class Reception:
-    """Looks at the first bytes of each TCP connection; lets it in, or not."""
-
-    def __init__(self, host: Host[Any], guard: Guard) -> None:
-        self._host = host
-        self._guard = guard
-        self._strangers: dict[Guest, None] = {}
-
-    def client(
-        self,
-        deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
-        *,
-        ordered: bool,
-        hold: Callable[[bool], None] = lambda _: None,
-        name: str = "",
-    ) -> Guest:
-        """Somebody has connected."""
-
-        def let_in() -> Peer:
-            self._strangers.pop(guest, None)
-            peer: Peer = self._host.client(deliver, hang_up, ordered=ordered, hold=hold, name=name)
-            return peer
-
-        guest = Guest(self._guard, let_in, hang_up, name)
-        self._strangers[guest] = None
-        if len(self._strangers) > STRANGERS:
-            next(iter(self._strangers)).turn_away("too many others want to come in")
-
-        return guest
-
-    def leave(self, client: Guest) -> None:
-        """It has gone."""
-        self._strangers.pop(client, None)
-        client.close()
-        if client.peer:
-            self._host.leave(client.peer)
-
-    def close(self) -> None:
-        """Hangs up on those who are not in yet."""
-        for guest in list(self._strangers):
-            guest.turn_away("the bridge has ended")
-
-
-class Guest:
-    """A TCP connection.
-
-    Attributes:
-        peer: What the host keeps of it, once it was let in.
-    """
-
-    def __init__(self, guard: Guard, let_in: Callable[[], Peer], hang_up: Callable[[], None], name: str) -> None:
-        self.peer: Peer | None = None
-        self._guard = guard
-        self._let_in = let_in
-        self._hang_up = hang_up
-        self._name = name
-        self._first = bytearray()
-        self._away = False
-        late = "it has not said its token in time"
-        loop = asyncio.get_running_loop()
-        self._timer = loop.call_later(FIRST_LINE, self.turn_away, late) if guard.token else None
-
-    def send(self, data: bytes) -> None:
-        """It has sent something."""
-        if self.peer and not self._away:
-            self.peer.send(data)
-            return
-
-        self._first += data
-        if self._away:
-            self._first.clear()
-        elif HTTP.match(self._first):
-            self.turn_away("it speaks HTTP, as a web browser does")
-        elif self._guard.token:
-            self._check()
-        elif not PERHAPS_HTTP.fullmatch(self._first):
-            self._enter(bytes(self._first))
-
-    def turn_away(self, reason: str) -> None:
-        """Hangs up."""
-        if not self._away:
-            self._guard.refuse(self._name, reason)
-            self.close()
-            self._hang_up()
-
-    def close(self) -> None:
-        """Is deaf from now on."""
-        self._away = True
-        if self._timer:
-            self._timer.cancel()
-
-    def _check(self) -> None:
-        """Lets it in if the first line is right."""
-        line, end, rest = bytes(self._first).partition(b"\n")
-        if end and line.startswith(TOKEN) and self._guard.knows(line.removeprefix(TOKEN).decode("latin-1").strip()):
-            self._enter(rest)
-        elif end or len(line) > LONGEST_LINE or not (TOKEN.startswith(line) or line.startswith(TOKEN)):
-            self.turn_away("a wrong token, or none")
-
-    def _enter(self, data: bytes) -> None:
-        if self._timer:
-            self._timer.cancel()
-
-        self.peer = self._let_in()
-        if data:
-            self.peer.send(data)
+    def crowded(self, name: str) -> None:
+        """One more than there may be has sent something."""
+        self._authenticator.refuse(name, f"{MANY} others use this port by udp, which is as many as may")

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from collections.abc import Callable
+import operator
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Generic, Literal, TypeVar
 
@@ -97,18 +98,34 @@ class Lease(Generic[F]):
         self._tell("released", holder, "anybody may move the arm")
 
     async def _halt(self, holder: Client[F]) -> None:
-        """Stops the arm; says it until the arm obeys, or the link is gone for good."""
+        """Stops the arm, and switches off what burns or turns; says it until it is done, or the link is gone for good.
+
+        Where switches are no part of the queue all is said once more when the stop was heard: what was still in the
+        queue may have switched something on after it was switched off. What an arm that obeys does not acknowledge is
+        given up after a while, for it may not know it.
+        """
         family = self._family
-        for frames in itertools.chain([family.stopping] * GENTLY, itertools.repeat(family.insisting)):
+        off = holder.watch.off()
+        final = not family.proves_stop
+        for attempt in itertools.count():
+            frames = [*(family.stopping if attempt < GENTLY else family.insisting), *off]
             answered = await self._line.stop(frames)
-            if answered if family.proves_stop else await self._is_seen_to_stand(holder):
+            told = attempt > GENTLY or all(map(operator.or_, answered, map(family.may_be_silent, frames)))
+            obeys = answered[0] if family.proves_stop else await self._is_seen_to_stand(holder, frames, answered)
+            if final and obeys and told:
                 self._tell("stopped", holder, "it has gone, and the arm was in motion")
                 return
 
-    async def _is_seen_to_stand(self, holder: Client[F]) -> bool:
+            final = final or obeys
+
+    async def _is_seen_to_stand(self, holder: Client[F], frames: Sequence[F], answered: Sequence[bool]) -> bool:
         """Whether an arm stands that was told to stop, and whose answer to that proves nothing."""
-        for frame in self._family.stopping:
+        for frame in frames:
             holder.watch.sent(frame)
+
+        for frame, was_answered in zip(frames, answered, strict=True):
+            if was_answered:
+                holder.watch.answered(frame, frame)
 
         return await self._stands(holder, LOOKS)
 

@@ -36,14 +36,15 @@ class Allowance:
     """A bucket of tokens: it fills with time and may be overdrawn once.
 
     Args:
-        rate: Units a second; a quarter of a second's worth may be spent at once.
+        rate: Units a second.
         clock: Returns seconds.
+        most: Units that may be spent at once; by default a quarter of a second's worth.
     """
 
-    def __init__(self, rate: float, clock: Callable[[], float]) -> None:
+    def __init__(self, rate: float, clock: Callable[[], float], most: float | None = None) -> None:
         self._rate = rate
         self._clock = clock
-        self._most = max(rate / 4, 1.0)
+        self._most = max(rate / 4, 1.0) if most is None else most
         self._left = self._most
         self._at = clock()
 

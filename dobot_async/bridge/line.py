@@ -45,17 +45,18 @@ class Line(Generic[F]):
             ready=ready,
         )
 
-    async def stop(self, frames: Sequence[F]) -> bool:
-        """Says what stops the arm ahead of everything, for a second; returns whether the first of it was answered.
+    async def stop(self, frames: Sequence[F]) -> list[bool]:
+        """Says what stops the arm ahead of everything, for a second; returns which of the frames were answered.
 
         It waits until the arm can be reached. Raises ConnectionLost if that is over.
         """
         await self._link.opened()
-        first, *_ = await asyncio.gather(*map(self._urge, frames), return_exceptions=True)
-        if isinstance(first, ConnectionLost):
-            raise first
+        replies = await asyncio.gather(*map(self._urge, frames), return_exceptions=True)
+        for reply in replies:
+            if isinstance(reply, ConnectionLost):
+                raise reply
 
-        return not isinstance(first, BaseException)
+        return [not isinstance(reply, BaseException) for reply in replies]
 
     async def _once(self, frame: F) -> F:
         """Sends what stops the arm at once and a single time: another one might end what its program has gone on to."""

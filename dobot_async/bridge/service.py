@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import Counter
 from collections.abc import Callable, Collection, Coroutine
 from contextlib import suppress
 from dataclasses import dataclass
@@ -24,10 +25,11 @@ from typing import Any, Generic, Literal, TypeVar
 
 from dobot_async._core.link.admission import Priority
 from dobot_async._core.link.link import Link
+from dobot_async._core.util.text import printable
 from dobot_async.bridge.client import Client
 from dobot_async.bridge.desk import Refused, Request
 from dobot_async.bridge.lease import Lease
-from dobot_async.bridge.limits import Limits
+from dobot_async.bridge.limits import Allowance, Limits
 from dobot_async.bridge.line import Line
 from dobot_async.bridged import Bridged, Kind
 from dobot_async.contract import Frame, LinkState
@@ -38,12 +40,18 @@ __all__ = ["Bridge", "BridgeEvent"]
 
 F = TypeVar("F", bound=Frame)
 logger = logging.getLogger("dobot_async.bridge")
+TOLD = {"turned away": 0.5, "connected": 1.0, "left": 1.0, "cut": 1.0, "refused": 2.0}
+"""Events a second of a kind that whoever reaches a port can cause; more of them are counted, and not told."""
+BURST = 40
 FAREWELL = 1.5  # seconds: with the closing of the link that is 2, for who is cancelled
 
 
 @dataclass(frozen=True, slots=True)
 class BridgeEvent:
-    """What happened at a bridge.
+    """What happened at a bridge, in printable ASCII whatever strangers have said.
+
+    A kind of event that strangers can cause is told 40 times at once, then once or twice a second; the next one says
+    how many were left out.
 
     Attributes:
         what: "connected", "left", "turned away", "cut", "refused", "lease", "released", "stopped", "link".
@@ -94,6 +102,9 @@ class Bridge(Generic[F]):
         self._line = Line(link, family)
         self._lease = Lease(self._line, family, takeover=takeover, on_vanish=on_vanish, cut=self.cut, tell=self._tell)
         self._farewells: set[asyncio.Task[None]] = set()
+        now = asyncio.get_running_loop().time
+        self._bounds = {what: Allowance(rate, now, most=BURST) for what, rate in TOLD.items()}
+        self._left_out: Counter[str] = Counter()
         link.on_unsolicited.add(self._unasked)
         self._watching = asyncio.create_task(self._watch_link(), name="dobot_async bridge link")
 
@@ -214,9 +225,18 @@ class Bridge(Generic[F]):
         if request.kind is Kind.STOP:
             return await self._stop(client, frame)
 
-        if request.kind is Kind.WRITE:
-            return await self._write(client, request)
+        if request.kind is Kind.OFF:
+            return await self._urge(client, frame)
 
+        await client.take_turn(request)
+        try:
+            return await (self._write if request.kind is Kind.WRITE else self._read)(client, request)
+        finally:
+            client.end_turn(request)
+
+    async def _read(self, client: Client[F], request: Request[F]) -> F:
+        """Passes on what changes nothing."""
+        frame = request.frame
         if not client.reads.try_acquire(frame.key, Priority.IMMEDIATE):
             await client.reads.acquire(frame.key, Priority.IMMEDIATE)
 
@@ -232,8 +252,14 @@ class Bridge(Generic[F]):
         if holder and holder is not client and not holder.gone:
             self.cut(holder, f"{client.name} has stopped the arm")
 
+        return await self._urge(client, frame)
+
+    async def _urge(self, client: Client[F], frame: F) -> F:
+        """Passes something on ahead of everything else."""
         client.watch.sent(frame)
-        return await self._line.ask(frame, urgent=True)
+        reply = await self._line.ask(frame, urgent=True)
+        client.watch.answered(frame, reply)
+        return reply
 
     async def _write(self, client: Client[F], request: Request[F]) -> F:
         """Passes on what changes something, once, for the holder of the lease."""
@@ -247,6 +273,7 @@ class Bridge(Generic[F]):
             if request.stops != self.stops:
                 raise Refused("the arm was stopped before it was sent")
 
+            client.end_turn(request)
             client.watch.sent(frame)
 
         reply = await self._line.ask(frame, ready=ready)
@@ -281,6 +308,18 @@ class Bridge(Generic[F]):
             self._tell("link", "", words.get(state, state.value))
 
     def _tell(self, what: str, client: Client[F] | str, detail: str = "") -> None:
-        event = BridgeEvent(what, client if isinstance(client, str) else client.name, detail)
+        """Tells what has happened; of what strangers can cause at will only so much, and how much was left out."""
+        bound = self._bounds.get(what)
+        if bound and bound.wait:
+            self._left_out[what] += 1
+            return
+
+        if bound:
+            bound.spend(1)
+            left_out = self._left_out.pop(what, 0)
+            detail = f"{detail} (and {left_out} more that are not told one by one)" if left_out else detail
+
+        name = client if isinstance(client, str) else client.name
+        event = BridgeEvent(what, printable(name), printable(detail))
         self.events.publish(event)
         logger.info("%s", event)

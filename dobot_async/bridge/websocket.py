@@ -1,167 +1,182 @@
-"""The WebSocket door: bytes of the protocol in binary messages, cut anywhere."""
+"""The WebSocket port: bytes of the protocol in binary messages, cut anywhere.
+
+    HTTP request --> refused, or accepted --> [TOKEN as first text] --> let in --> binary messages --> Host.client.send
+
+The messages are those of the websockets library's own state machine; the connection is the same as for tcp, so that the
+same few pending ones are allowed, in the same time.
+"""
 
 from __future__ import annotations
 
 import asyncio
-import ssl
-from contextlib import AsyncExitStack, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from dobot_async.bridge.doors import FIRST_LINE, LONGEST_LINE, STRANGERS, Guard
-from dobot_async.transports.listen import Host, url_of
+from dobot_async.bridge.handshake import LONGEST_LINE, MOST, TOKEN, Handshakes, PendingConnection
 from dobot_async.transports.websocket import PING, PONG_WITHIN, quiet, websockets
 
-__all__ = ["on_ws"]
+__all__ = ["WebSocketConnection"]
 
 BIGGEST_MESSAGE = 4096
-OUTBOX = 256  # messages; a client that does not read so many does not live
-BEARER, TOKEN = "Bearer ", "TOKEN "
+BEARER = "Bearer "
 ENDED = 1008  # "policy violation": the code for everything that is not the network's fault
 
 
-async def on_ws(
-    host: Host[Any], stack: AsyncExitStack, guard: Guard, *, address: str, port: int, tls: ssl.SSLContext | None
-) -> str:
-    """A WebSocket port; returns its URL."""
-    door = Door(host, guard)
-    server = await websockets("server").serve(
-        door.serve,
-        address,
-        port,
-        ssl=tls,
-        process_request=door.look,
-        compression=None,
-        max_size=BIGGEST_MESSAGE,
-        max_queue=4,
-        ping_interval=PING,
-        ping_timeout=PONG_WITHIN,
-        open_timeout=FIRST_LINE,
-        close_timeout=0.5,
-        logger=quiet(),
-        server_header=None,
-    )
-    stack.push_async_callback(server.wait_closed)
-    stack.callback(server.close)
-    return url_of("wss" if tls else "ws", next(iter(server.sockets)).getsockname())
+class WebSocketConnection(PendingConnection):
+    """A WebSocket connection, from its HTTP request on."""
 
+    def __init__(
+        self,
+        handshakes: Handshakes,
+        deliver: Callable[[bytes], None],
+        hang_up: Callable[[], None],
+        *rest: Any,
+        **more: Any,
+    ) -> None:
+        super().__init__(handshakes, deliver, hang_up, *rest, **more)
+        library = websockets("server")
+        self._opcodes = websockets("frames").Opcode
+        self._socket = library.ServerProtocol(max_size=BIGGEST_MESSAGE, logger=quiet())
+        self._loop = asyncio.get_running_loop()
+        self._heard = self._loop.time()
+        self._accepted = self._known = self._binary = False
+        self._received = 0
+        self._ping: asyncio.TimerHandle | None = None
 
-class Door:
-    """Lets WebSocket clients in."""
+    def receive(self, data: bytes) -> None:
+        """Take the next bytes of the connection."""
+        self._heard = self._loop.time()
+        self._received += len(data)
+        self._socket.receive_data(data)
+        for event in self._socket.events_received():
+            if self._away:
+                return
 
-    def __init__(self, host: Host[Any], guard: Guard) -> None:
-        self._host = host
-        self._guard = guard
-        self._strangers = 0
+            if not self._accepted:
+                self._request(event)
+            else:
+                self._frame(event)
 
-    def look(self, connection: Any, request: Any) -> Any:
-        """Called with each request for a connection; returns a response to refuse it.
+        self._flush()
+        if not self._accepted and self._received > MOST:
+            self.turn_away("a request that does not end")
+
+    def deliver(self, data: bytes) -> None:
+        """Send a binary message."""
+        if not self._away:
+            self._socket.send_binary(data)
+            self._flush()
+
+    def hang_up(self) -> None:
+        """Say that it ends, and end it; what it has not read is lost with it."""
+        if self._accepted and not self._away:
+            self._socket.fail(ENDED, "the bridge has ended this connection")
+            self._written()
+
+        super().hang_up()
+
+    def close(self) -> None:
+        """Be deaf from now on."""
+        super().close()
+        if self._ping:
+            self._ping.cancel()
+
+    def _request(self, request: Any) -> None:
+        """Answer the HTTP request.
 
         A browser that presents no token must belong to a page that may come without, for it serves any page.
         """
-        name = url_of("ws", connection.remote_address)
-        given = presented(request)
-        if given is not None and not self._guard.knows(given):
-            self._guard.refuse(name, "a wrong token")
-            return connection.respond(HTTPStatus.UNAUTHORIZED, "wrong token\n")
-
-        connection.token_known = self._guard.token is None or given is not None
-        origin = request.headers.get("Origin")
-        if origin and self._guard.token is None and origin not in self._guard.origins:
-            self._guard.refuse(name, f"a web page of {origin}")
-            return connection.respond(HTTPStatus.FORBIDDEN, "this web page may not connect without a token\n")
-
-        return None
-
-    async def serve(self, connection: Any) -> None:
-        """One client, from its first message to its end."""
-        name = url_of("ws", connection.remote_address)
-        closed = websockets("exceptions").ConnectionClosed
-        with suppress(closed):
-            if not (connection.token_known or await self._hear_token(connection)):
-                self._guard.refuse(name, "a wrong token, or none in time")
-                await connection.close(ENDED, "wrong token")
+        given, origin = presented(request), request.headers.get_all("Origin")
+        guard = self.authenticator
+        if given is not None and not guard.knows(given.encode(errors="surrogateescape")):
+            self._refuse(HTTPStatus.UNAUTHORIZED, "wrong token\n", "a wrong token")
+        elif guard.token is None and not guard.origins.issuperset(filter(None, origin)):
+            self._refuse(
+                HTTPStatus.FORBIDDEN,
+                "this web page may not connect without a token\n",
+                f"a web page of {' '.join(origin)}",
+            )
+        else:
+            response = self._socket.accept(request)
+            self._socket.send_response(response)
+            if response.status_code != HTTPStatus.SWITCHING_PROTOCOLS:
+                self._written()
+                self.turn_away("a request for something else than a WebSocket")
                 return
 
-            client = Guest(self._host, name)
-            sending = asyncio.create_task(client.deliver_to(connection), name=f"dobot_async bridge to {name}")
-            try:
-                async for message in connection:
-                    if isinstance(message, bytes):
-                        client.peer.send(message)
-                        await client.room.wait()
-            finally:
-                self._host.leave(client.peer)
-                sending.cancel()
-                await asyncio.wait([sending])
+            self._accepted = True
+            self._known = guard.token is None or given is not None
+            self._ping = self._loop.call_later(PING, self._look)
+            if self._known:
+                self.enter()
 
-    async def _hear_token(self, connection: Any) -> bool:
-        """Whether the first message is the token, in time."""
-        if self._strangers == STRANGERS:
-            return False
+    def _refuse(self, status: HTTPStatus, told: str, reason: str) -> None:
+        self._socket.send_response(self._socket.reject(status, told))
+        self._written()
+        self.turn_away(reason)
 
-        self._strangers += 1
-        try:
-            async with asyncio.timeout(FIRST_LINE):
-                first = await connection.recv()
-        except TimeoutError:
-            return False
-        finally:
-            self._strangers -= 1
+    def _frame(self, frame: Any) -> None:
+        """Take one frame; text is for people, and but for the token left out."""
+        if frame.opcode in {self._opcodes.TEXT, self._opcodes.BINARY}:
+            self._binary = frame.opcode is self._opcodes.BINARY
+        elif frame.opcode is not self._opcodes.CONT:
+            return
 
-        line = isinstance(first, str) and len(first) <= LONGEST_LINE and first.startswith(TOKEN)
-        return line and self._guard.knows(first.removeprefix(TOKEN).strip())
-
-
-class Guest:
-    """A client that was let in.
-
-    Attributes:
-        peer: What the host keeps of it.
-        room: Set while it may send.
-    """
-
-    def __init__(self, host: Host[Any], name: str) -> None:
-        self.room = asyncio.Event()
-        self.room.set()
-        self._outbox: asyncio.Queue[bytes | None] = asyncio.Queue(OUTBOX)
-        self.peer = host.client(self._deliver, self._hang_up, ordered=True, hold=self._hold, name=name)
-
-    async def deliver_to(self, connection: Any) -> None:
-        """Sends what the host has for it, until the host hangs up or it does."""
-        with suppress(websockets("exceptions").ConnectionClosed):
-            while (data := await self._outbox.get()) is not None:
-                await connection.send(data)
-
-            await connection.close(ENDED, "the bridge has ended this connection")
-
-    def _deliver(self, data: bytes) -> None:
-        try:
-            self._outbox.put_nowait(data)
-        except asyncio.QueueFull:
-            self._hang_up()
-
-    def _hang_up(self) -> None:
-        """What it has not read is lost with it."""
-        self.room.set()
-        while not self._outbox.empty():
-            self._outbox.get_nowait()
-
-        self._outbox.put_nowait(None)
-
-    def _hold(self, held: bool) -> None:
-        if held:
-            self.room.clear()
+        data = bytes(frame.data)
+        if self.peer:
+            if self._binary and data:
+                self.peer.send(data)
+        elif not self._binary and len(data) <= LONGEST_LINE and data.startswith(TOKEN):
+            if self.authenticator.knows(data.removeprefix(TOKEN)):
+                self.enter()
+            else:
+                self.turn_away("a wrong token")
         else:
-            self.room.set()
+            self.turn_away("a wrong token, or none")
+
+    def _look(self) -> None:
+        """Ask whether it is still there, from time to time; end it if it is not."""
+        if self._loop.time() > self._heard + PING + PONG_WITHIN:
+            PendingConnection.hang_up(self)
+            return
+
+        self._ping = self._loop.call_later(PING, self._look)
+        if self._socket.state is websockets("server").OPEN:
+            self._socket.send_ping(b"")
+            self._flush()
+
+    def _flush(self) -> None:
+        """Send what there is to send; end the connection when that is the end."""
+        if not self._away and self._written():
+            self._end()
+
+    def _written(self) -> bool:
+        """Send what there is to send; return whether nothing comes after it."""
+        out = self._socket.data_to_send()
+        for data in filter(None, out):
+            self._write(data)
+
+        return b"" in out
+
+    def _end(self) -> None:
+        """The WebSocket has ended, in good order or for a breach of its rules."""
+        if self.peer:
+            PendingConnection.hang_up(self)
+        else:
+            self.turn_away("no request for a WebSocket, or one that ends at once")
 
 
 def presented(request: Any) -> str | None:
-    """The token in the headers, or the URL, of a request."""
-    header: str = request.headers.get("Authorization", "")
-    if header.startswith(BEARER):
-        return header.removeprefix(BEARER).strip()
+    """The token in the headers, or the URL, of a request; the last one if there are several."""
+    headers = request.headers.get_all("Authorization")
+    if headers and headers[-1].startswith(BEARER):
+        return str(headers[-1]).removeprefix(BEARER)
 
-    tokens = parse_qs(urlsplit(request.path).query).get("token", [])
-    return tokens[0] if tokens else None
+    with suppress(ValueError):  # a path that is none
+        tokens = parse_qs(urlsplit(request.path).query).get("token", [])
+        return tokens[-1] if tokens else None
+
+    return None

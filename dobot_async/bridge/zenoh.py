@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import socket
 from collections.abc import Callable
 from contextlib import AsyncExitStack, suppress
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import SplitResult
 
 from dobot_async._core.util.tasks import run_shielded
+from dobot_async._core.util.text import printable
 from dobot_async.bridge.limits import Allowance
 from dobot_async.bridge.service import Bridge
 from dobot_async.bridge.telemetry import Telemetry
@@ -36,6 +38,9 @@ __all__ = ["on_zenoh"]
 HELD = 65_536
 """Bytes that are kept of a client that has to wait; one that sends more than that is cut off."""
 
+GIVES_WAY = 1.0  # seconds until one of two that began at the same time has taken its token back
+PRESENT = 1024  # tokens of clients that are kept; those of clients that are let in always
+CHUNK = re.compile(r"[^*$/]{1,64}")
 STRANGERS = 100  # answers a second to those who are no clients, all together
 LONGEST_NAME, LONGEST_INTRODUCTION = 80, 1024
 EVERYWHERE = {"/0.0.0.0:": "/127.0.0.1:", "/[::]:": "/[::1]:"}
@@ -87,7 +92,7 @@ class Door:
         self.session = Session(place, serving=True)
         self.bridge = bridge
         self._name = place.name
-        self._present: set[str] = set()
+        self._present: dict[str, None] = {}
         self._guests: dict[str, Guest] = {}
         self._leaving: set[asyncio.Task[None]] = set()
         self._told = Allowance(STRANGERS, asyncio.get_running_loop().time)
@@ -101,11 +106,20 @@ class Door:
             ConnectFailed: Zenoh cannot be started, or there is an arm of that name.
         """
         await self.session.open(self._begin)
-        if await self.session.tokens(f"{self.keys.arm}/*/*"):
-            raise ConnectFailed(f"an arm called {self._name} is on Zenoh already; give this one another name")
+        if await self._others():
+            raise ConnectFailed(self._taken())
 
+        # Another one may have looked at the same time. Who comes behind sees both now; where both do, one gives way.
         key = f"{self.keys.arm}/{self.bridge.family.model}/{self.session.id}"
         self._token = self.session.raw.liveliness().declare_token(key)
+        others = await self._others()
+        if others and self.session.id < min(others):
+            await asyncio.sleep(GIVES_WAY)
+            others = await self._others()
+
+        if others:
+            self._token.undeclare()  # type: ignore[no-untyped-call]
+            raise ConnectFailed(self._taken())
 
     async def aclose(self) -> None:
         """Tells all clients, takes back the name, and ends the session; takes a few seconds at most."""
@@ -135,6 +149,15 @@ class Door:
             self._leaving.add(leaving)
             leaving.add_done_callback(self._leaving.discard)
 
+    async def _others(self) -> set[str]:
+        """The ids of those who serve an arm of this name as well."""
+        return {token.rpartition("/")[2] for token in await self.session.tokens(f"{self.keys.arm}/*/*")} - {
+            self.session.id
+        }
+
+    def _taken(self) -> str:
+        return f"an arm called {self._name} is on Zenoh already; give this one another name"
+
     async def _end(self) -> None:
         if self._leaving:
             await asyncio.wait(self._leaving)
@@ -158,10 +181,12 @@ class Door:
     def _notice(self, change: tuple[str, bool]) -> None:
         """A client's token has come or gone."""
         name, present = change
-        if present:
-            self._present.add(name)
-        else:
-            self._present.discard(name)
+        if present and CHUNK.fullmatch(name):
+            self._present[name] = None
+            if len(self._present) > PRESENT:
+                del self._present[next(each for each in self._present if each not in self._guests)]
+        elif not present:
+            self._present.pop(name, None)
             guest = self._guests.get(name)
             if guest:
                 self.leave(guest, "its token has gone")
@@ -184,12 +209,15 @@ class Door:
             query.reply(query.key_expr, b"")
 
     def _heard(self, message: tuple[str, bytes]) -> None:
-        """A client has sent something; who is none any more, or not yet, is told so."""
+        """A client has sent something; who is none any more, or not yet, is told so.
+
+        A name with a wildcard is not answered: it would be all clients at once.
+        """
         name, data = message
         guest = self._guests.get(name)
         if guest:
             guest.send(data)
-        elif self._may_tell():
+        elif CHUNK.fullmatch(name) and self._may_tell():
             with suppress(library().ZError):
                 self.way(name, waits=False)(Numbered().pack(b"its connection has ended", END))
 
@@ -256,14 +284,9 @@ def introduction(query: zenoh.Query) -> str | None:
     with suppress(ValueError, AttributeError, RecursionError):
         told = json.loads(payload) if len(payload) <= LONGEST_INTRODUCTION else {}
         if told.get("version") == VERSION:
-            return printable(str(told.get("who", "")))[:LONGEST_NAME]
+            return printable(str(told.get("who", "")), LONGEST_NAME)
 
     return None
-
-
-def printable(text: str) -> str:
-    """What a client calls itself, without anything that a terminal would obey."""
-    return "".join(character if character.isprintable() else "?" for character in text)
 
 
 def read_message(sample: zenoh.Sample) -> tuple[str, bytes]:

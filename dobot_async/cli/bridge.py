@@ -8,11 +8,11 @@ from typing import Any
 import click
 
 from dobot_async.cli.addresses import connectable
+from dobot_async.cli.credentials import own_token
 from dobot_async.cli.session import Session, run
 
 __all__ = ["FILE", "GROUPS", "bridge", "serve"]
 
-LONGEST_TOKEN = 4096
 GROUPS = ("wifi", "calibration", "firmware")
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -51,21 +51,7 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
     if session.trace:
         raise click.UsageError("a bridge writes no trace: passwords go through it; trace the program that connects")
 
-    if token_file:
-        token = token_in(token_file)
-
-    run(serve(session, token=token, **details))
-
-
-def token_in(file: Path) -> str:
-    """Returns the token in a file; raises UsageError if there is none."""
-    with file.open("rb") as opened:
-        token = opened.read(LONGEST_TOKEN + 1).strip()
-
-    if not token.isascii() or not 1 <= len(token) <= LONGEST_TOKEN:
-        raise click.UsageError(f"{file} has no token: one word of printable ASCII characters")
-
-    return token.decode("ascii")
+    run(serve(session, token=own_token(token, token_file), **details))
 
 
 async def serve(session: Session, *, source: str, token: str | None, **details: Any) -> None:

@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -129,6 +130,12 @@ def global_options() -> list[click.Option]:
             ["--url"],
             help="Where the arm is: serial:///dev/ttyUSB0, serial://COM3, udp://192.168.1.20, tcp://host:port, ble: or "
             "sim: (a simulated one). Default: DOBOT_URL.",
+        ),
+        click.Option(
+            ["--token-file"],
+            type=click.Path(exists=True, dir_okay=False, path_type=Path),
+            metavar="FILE",
+            help="A file with the token of the bridge at --url. Default: the variable DOBOT_TOKEN.",
         ),
         click.Option(
             ["--arm"],

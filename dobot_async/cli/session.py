@@ -12,11 +12,13 @@ import signal
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import click
 
 from dobot_async.cli.arms import FAMILIES
+from dobot_async.cli.credentials import with_token
 from dobot_async.cli.failures import Interrupted
 from dobot_async.cli.family import Family
 from dobot_async.cli.output import Output
@@ -42,6 +44,7 @@ class Session:
         trace: The file for every frame, "-" for standard error.
         output: Where to speak.
         commanding: Whether an arm is held that stops if the work is interrupted.
+        token_file: A file with the token of the bridge at `url`.
         given: The names of the options that were given, not those that came from the environment.
     """
 
@@ -50,6 +53,7 @@ class Session:
     trace: str | None
     output: Output
     commanding: bool = False
+    token_file: Path | None = None
     given: set[str] = field(default_factory=set)
 
     @property
@@ -79,7 +83,7 @@ class Session:
     def target(self) -> str:
         """The URL of the arm; raises UsageError if there is none."""
         if self.url:
-            return self.url
+            return with_token(self.url, self.token_file)
 
         forms = "; ".join(form for _, form in SCHEMES.values())
         raise click.UsageError(f"which arm? Give --url or set DOBOT_URL, to one of: {forms}")

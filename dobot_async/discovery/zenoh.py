@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dobot_async.discovery.found import Found
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.zenoh_place import address
+from dobot_async.transports.zenoh_place import NAME, address
 
 if TYPE_CHECKING:
     import zenoh
@@ -70,13 +70,20 @@ class ZenohArms:
         try:
             await session.open(begin)
             while key := await next_of(arrived, end):
-                yield self._found(key)
+                if found := self._found(key):
+                    yield found
         finally:
             await session.aclose()
 
-    def _found(self, key: str) -> Found:
-        """What a token says: dobot/NAME/@arm/MODEL/ID."""
+    def _found(self, key: str) -> Found | None:
+        """What a token says: dobot/NAME/@arm/MODEL/ID; None for what is no arm that anybody can connect to.
+
+        Anybody may declare a token, and may put into it what a terminal obeys.
+        """
         _, name, _, model, server = key.split("/")
+        if not all(map(NAME.fullmatch, (name, model, server))):
+            return None
+
         url = address(name, config=self._config, connect=self._connect)
         return Found(url, self.name, f"{name} {server}", "served on Zenoh", families=(model,))
 

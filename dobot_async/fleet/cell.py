@@ -129,7 +129,7 @@ def member(table: Mapping[str, Any]) -> Member[AnyArm]:
 def connect_options(family: str, kind: type[Any], table: Mapping[str, Any]) -> dict[str, Any]:
     """What `connect` of a family is given; raises ValueError for what it does not take."""
     parameters = inspect.signature(kind.connect).parameters
-    defaults = {name: each.default for name, each in parameters.items() if name not in UNSUITABLE}
+    defaults = {name: LIKE.get(name, each.default) for name, each in parameters.items() if name not in UNSUITABLE}
     known(table, [name for name in defaults if kinds_of(defaults[name])], f"connect of a {family}")
     found = {name: option(name, defaults[name], value) for name, value in table.items()}
     model, words = found.get("model"), (family, *dict(families())[family].models)
@@ -168,6 +168,9 @@ def wrong_kind(name: str, value: object) -> NoReturn:
 
 
 UNSUITABLE = {"url"}
+LIKE: Mapping[str, object] = {"reply_timeout": (0.1, 0.5)}
+"""A value for options that have none of their kind as their default, since it depends on the URL."""
+
 KINDS: Mapping[type[Any], tuple[type[Any], ...]] = {
     bool: (bool,),
     tuple: (float, tuple),

@@ -5,11 +5,13 @@ What is no known read counts as a write, so that nothing reaches the arm unseen 
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, NamedTuple
 
 from dobot_async.arms.session import open_in_time
-from dobot_async.bridged import ByKey, Kind, Reading
+from dobot_async.bridged import ByKey, Kind, Reading, Switch
 from dobot_async.contract import Parser
 from dobot_async.errors import ProtocolError
 from dobot_async.magician import alarms
@@ -32,57 +34,112 @@ STOPS = {c.SET_QUEUED_CMD_STOP_EXEC.id, c.SET_QUEUED_CMD_FORCE_STOP_EXEC.id}
 TOOLS_OFF = {(row.id, row.request.encode(value)) for row, value in TOOLS}
 IDLE = c.SET_JOG_CMD.request.encode(c.JOGCmd(is_joint=False, cmd=c.JOGKey.IDLE))[1:]
 MOTORS = {c.SET_E_MOTOR.id, c.SET_E_MOTOR_S.id}
+NO_DUTY = c.SET_IOPWM.request.encode(c.IOPWM(1, 1000.0, 0.0))[1:]
 
 
 class MagicianWatch:
-    """What one program has made the arm do: the last index that it got, and what has no index."""
+    """What one program has made the arm do: the last index that it got, what goes on beside the queue, what is on.
+
+    An immediate motion ends with a force-stop alone. So does, for all that is known, the command that executes when the
+    queue is cleared.
+    """
 
     def __init__(self) -> None:
         self.question = f.request(c.GET_QUEUED_CMD_CURRENT_INDEX, b"", queued=False)
         self._last: int | None = None
-        self._running: set[object] = set()
+        self._unacknowledged = False
+        self._goes_on = False
+        self._halted = False
+        self._switches: defaultdict[tuple[int, bytes], Switch] = defaultdict(Switch)
 
     def sent(self, request: Frame) -> None:
         """A request that is no read goes out."""
-        if request.id in {c.SET_QUEUED_CMD_CLEAR.id, c.SET_QUEUED_CMD_FORCE_STOP_EXEC.id}:
-            self._running -= {"unacknowledged", "immediate"}
-            if request.id == c.SET_QUEUED_CMD_CLEAR.id:
-                self._last = None
-        elif request.id == c.SET_JOG_CMD.id:
-            self._note("jog", running=request.params[1:] != IDLE)
-        elif request.id == c.SET_END_EFFECTOR_LASER.id:
-            self._note("laser", running=any(request.params[1:]))
-        elif request.id == c.SET_E_MOTOR.id:
-            self._note(request.params[:1], running=any(request.params[1:2]))
-        elif not request.queued and moves(request):
-            self._note("immediate", running=True)
+        switch = switched(request)
+        if switch and switch.on:
+            self._switches[switch.what].switch_on(queued=request.queued)
+        elif not switch and not request.queued and moves(request):
+            self._goes_on = True
 
         if request.queued:
-            self._note("unacknowledged", running=True)
+            self._unacknowledged = True
+
+        if request.queued or request.id == c.SET_QUEUED_CMD_START_EXEC.id:
+            self._halted = False
 
     def answered(self, request: Frame, reply: Frame) -> None:
         """It was answered."""
+        if request.id == c.SET_QUEUED_CMD_FORCE_STOP_EXEC.id:
+            self._halted, self._goes_on = True, False
+        elif request.id == c.SET_QUEUED_CMD_CLEAR.id:
+            self._emptied()
+
+        switch = switched(request)
+        if switch and (not switch.on or (request.queued and switch.ends)):
+            self._switches[switch.what].switch_off(queued=request.queued)
+
         if request.queued:
-            self._note("unacknowledged", running=False)
+            self._unacknowledged = False
             if len(reply.params) == INDEX.struct.size:
                 self._last = INDEX.decode(reply.params)
 
     def moving(self, reply: Frame | None) -> bool:
         """Returns whether the arm is, or may be, in the middle of what it was told; `reply` is that to the question."""
-        if self._running or self._last is None:
-            return bool(self._running)
-
-        if reply is None:
+        if self._goes_on or self._unacknowledged:
             return True
 
-        index = INDEX.decode(reply.params)
-        return index < self._last or index > self._last + GARBAGE
+        if self._last is not None:
+            index = self._last - 1 if reply is None else INDEX.decode(reply.params)
+            if index < self._last or index > self._last + GARBAGE:
+                return True
 
-    def _note(self, what: object, *, running: bool) -> None:
-        if running:
-            self._running.add(what)
-        else:
-            self._running.discard(what)
+        return any(switch.is_on(finished=True) for switch in self._switches.values())
+
+    def off(self) -> Sequence[Frame]:
+        """Returns what ends the PWM of its pins: what hangs there may turn or burn. The rest is in `stopping`."""
+        addresses = [what for row, what in self._switches if row == c.SET_IOPWM.id]
+        return [f.request(c.SET_IOPWM, address + NO_DUTY, queued=False) for address in addresses]
+
+    def _emptied(self) -> None:
+        """The queue was cleared."""
+        if not self._halted and (self._last is not None or self._unacknowledged):
+            self._goes_on = True
+
+        self._last, self._unacknowledged = None, False
+        for switch in self._switches.values():
+            switch.empty()
+
+
+class Switched(NamedTuple):
+    """What a request does to something that burns, turns or moves until it is told otherwise.
+
+    Attributes:
+        what: Which thing it is.
+        on: Whether it switches it on.
+        ends: Whether it ends by itself.
+    """
+
+    what: tuple[int, bytes]
+    on: bool
+    ends: bool = False
+
+
+def switched(request: Frame) -> Switched | None:
+    """What a request switches on or off; None if nothing."""
+    params = request.params
+    if request.id == c.SET_JOG_CMD.id:
+        return Switched((request.id, b""), params[1:] != IDLE)
+
+    if request.id == c.SET_END_EFFECTOR_LASER.id:
+        return Switched((request.id, b""), any(params[1:]))
+
+    if request.id in MOTORS:
+        ends = request.id == c.SET_E_MOTOR_S.id
+        return Switched((c.SET_E_MOTOR.id, params[:1]), any(params[1:2]), ends)
+
+    if request.id == c.SET_IOPWM.id:
+        return Switched((request.id, params[:1]), any(params[5:]))
+
+    return None
 
 
 def told_pose(reply: Frame) -> dict[str, Any]:
@@ -104,6 +161,7 @@ class BridgedMagician(ByKey[Frame]):
     """See `dobot_async.bridged.Bridged`."""
 
     model = "magician"
+    header = f.HEADER
     filler = f.FILLER
     encode = staticmethod(f.request)
     proves_stop = True
@@ -139,8 +197,11 @@ class BridgedMagician(ByKey[Frame]):
         """Returns what a request is."""
         now = request.write and not request.queued
         ends_jog = request.id == c.SET_JOG_CMD.id and request.params[1:] == IDLE
-        if request.id in STOPS or (now and (ends_jog or (request.id, request.params) in TOOLS_OFF)):
+        if request.id in STOPS or (now and ends_jog):
             return Kind.STOP
+
+        if now and (request.id, request.params) in TOOLS_OFF:
+            return Kind.OFF
 
         known = (request.id, False) in c.BY_KEY or request.id in LITE_READS
         return Kind.READ if known and not request.write and not request.queued else Kind.WRITE
@@ -159,7 +220,7 @@ class BridgedMagician(ByKey[Frame]):
         """Returns whether it does no harm to send it again: never for what moves anything."""
         row = row_of(request)
         if row is None or request.queued or row.moves or row.id in MOTORS:
-            return self.kind(request) is Kind.STOP
+            return self.kind(request) in {Kind.STOP, Kind.OFF}
 
         return row.repeatable
 

@@ -6,8 +6,8 @@ unanswered; that a stop was heard is found by looking at the arm. The gap betwee
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any
@@ -42,7 +42,7 @@ CALIBRATION = (
 class CobotWatch:
     """What one program has made the arm do: it moves while the arm says so, and for a while after the last motion."""
 
-    def __init__(self, model: CobotModel, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, model: CobotModel, clock: Callable[[], float]) -> None:
         self.question = request(model, c.IS_MOVING)
         self._model = model
         self._clock = clock
@@ -72,6 +72,10 @@ class CobotWatch:
 
         return self._told and self._model.row(c.IS_MOVING).reply.decode(reply.params)
 
+    def off(self) -> Sequence[Frame]:
+        """Returns nothing: what these arms switch holds, and does not burn or turn."""
+        return ()
+
 
 STOPS = frozenset({c.STOP, c.JOG_STOP})
 
@@ -83,6 +87,7 @@ class BridgedCobot(ByKey[Frame]):
     """See `dobot_async.bridged.Bridged`; one for each model."""
 
     filler = b""
+    header = f.HEADER
     encode = staticmethod(f.request)
     proves_stop = False
 
@@ -110,7 +115,7 @@ class BridgedCobot(ByKey[Frame]):
 
     def watch(self) -> CobotWatch:
         """Returns what follows one program."""
-        return CobotWatch(self._model)
+        return CobotWatch(self._model, asyncio.get_running_loop().time)
 
     def kind(self, request: Frame) -> Kind:
         """Returns what a request is."""

@@ -219,18 +219,24 @@ class State:
 
     def settled(self, row: Command[Q, None], slot: int = 0) -> Q:
         """Returns what the hardware behind a register does by now, for it takes its time to follow."""
-        since, before = self._changes.get((row.id, slot), (-math.inf, None))
-        if before is not None and self._now() < since + LATENCIES[row]:
+        follows, before = self._changes.get((row.id, slot), (-math.inf, None))
+        if before is not None and self._now() < follows:
             former: Q = before
             return former
 
         return self.get(row, slot)
 
+    @property
+    def due(self) -> float:
+        """When the next hardware follows what was switched; infinity if none has to."""
+        now = self._now()
+        return min((follows for follows, _ in self._changes.values() if follows > now), default=math.inf)
+
     def set(self, row: Command[Q, None], value: Q) -> None:
         """Does what a Set row does that takes no time."""
         slot = getattr(value, SLOTS[row]) if row in SLOTS else 0
         if row in LATENCIES and value != self.get(row, slot):
-            self._changes[row.id, slot] = self._now(), self.settled(row, slot)
+            self._changes[row.id, slot] = self._now() + LATENCIES[row], self.settled(row, slot)
 
         self._registers[row.id, slot] = value
         if row in WIFI:

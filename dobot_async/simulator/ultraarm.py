@@ -125,6 +125,12 @@ class SimulatedUltraArm:
         return self.registers.opening(self.device.now)
 
     @property
+    def gripper_moving(self) -> bool:
+        """Whether the gripper has not got there yet."""
+        target = self.registers.gripper
+        return target is not None and self.gripper != target
+
+    @property
     def executed(self) -> list[Executed]:
         """What has been executed so far, in order; a motion that led nowhere is among it, for the arm says nothing."""
         return self.device.executed

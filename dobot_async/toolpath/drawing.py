@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, SupportsFloat
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, another
 from dobot_async.magician.arm import Magician
@@ -102,7 +103,7 @@ class Drawing:
         check_moves((move for moves in self._strokes for move in moves), self._reach)
         self._running: asyncio.Task[Any] | None = None
         self._stopped = False
-        self._epoch: Any = None
+        self._epoch = Epoch()
         self._position = Position(0)
 
     @property
@@ -145,7 +146,7 @@ class Drawing:
             return
 
         self._running, self._stopped = asyncio.current_task(), False
-        self._epoch = getattr(self._arm.queue, "epoch", None)  # which a stop by anybody ends, where the queue has one
+        self._epoch = self._arm.queue.epoch  # which a stop by anybody ends
         try:
             here, program = await program_for(self._arm, self._tool, self._pace)
             moves = self._moves(here)
@@ -238,8 +239,7 @@ class Drawing:
         if self._stopped:
             raise MotionStopped("the drawing was stopped")
 
-        if self._epoch:
-            self._epoch.check()
+        self._epoch.check()
 
     async def _watch(self, pending: deque[Sent]) -> None:
         """Ask now and then how far the arm is: no more often, for each question takes the line for a while."""

@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from importlib import import_module
 from typing import Any, cast
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 from dobot_async.transports.base import Transport
 
 __all__ = ["SCHEMES", "Transport", "hidden", "open_transport"]
 
-TOKEN = re.compile(r"\btoken=[^&]*", re.IGNORECASE)
+USER = re.compile(r"(?<=//)[^/?#]*@")
+SECRET = re.compile(r"token(?!_file$)|password|secret|key", re.IGNORECASE)
+NAME = re.compile(r"[?&;#]([^=?&;#]*)=")
 SCHEMES = {
     "serial": ("dobot_async.transports.serial", "serial:///dev/ttyUSB0, serial://COM3 (?baud=115200)"),
     "udp": ("dobot_async.transports.network", "udp://192.168.1.20 (port 8899)"),
@@ -39,12 +41,21 @@ async def open_transport(url: str, *, arm: str) -> Transport:
         parts = urlsplit(url)
         return cast(Transport, await module_of(parts.scheme).open_url(parts, arm=arm))
     except ValueError as error:
-        raise ValueError(f"{hidden(url)!r}: {error}") from None
+        shown = hidden(url)
+        # What it quotes of the URL may be the secret.
+        reason = "the port is no number" if shown != url and str(error).startswith("Port") else error
+        raise ValueError(f"{shown!r}: {reason}") from None
 
 
 def hidden(url: str) -> str:
-    """Returns a URL as it may be shown: without its token."""
-    return TOKEN.sub("token=...", url)
+    """Returns a URL as it may be shown: without its token, however it is written, and without a user's password."""
+    rest, shown = USER.sub("...@", url), ""
+    while secret := next((found for found in NAME.finditer(rest) if SECRET.search(unquote(found[1]).strip())), None):
+        shown += f"{rest[: secret.end()]}..."
+        _, more, rest = rest[secret.end() :].partition("&")
+        rest = more + rest
+
+    return shown + rest
 
 
 def module_of(scheme: str) -> Any:

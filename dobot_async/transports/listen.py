@@ -3,7 +3,7 @@
     client --bytes--> Host.client(...).send        deliver --bytes--> client
 
 Each client gets an object of its own from the host, so that one's half frame never touches another's. There are no
-tasks: the event loop calls, and the host answers when it likes.
+tasks but one while TLS is agreed upon: the event loop calls, and the host answers when it likes.
 """
 
 from __future__ import annotations
@@ -12,10 +12,14 @@ import asyncio
 import ssl
 from collections.abc import Callable
 from contextlib import AsyncExitStack
+from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar, cast
 
+from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.transports.base import MANY
 from dobot_async.transports.keep_alive import PeerWatch, keep_alive
+
+TLS_WITHIN = 5.0  # seconds
 
 __all__ = ["Connection", "Datagrams", "Host", "Peer", "on_tcp", "on_udp", "url_of"]
 
@@ -28,6 +32,7 @@ class Peer(Protocol):
 
 
 P = TypeVar("P", bound=Peer)
+Handshake = asyncio.Task[asyncio.Transport | None]
 
 
 class Host(Protocol[P]):
@@ -57,14 +62,47 @@ class Host(Protocol[P]):
 
 
 async def on_tcp(
-    host: Host[Any], stack: AsyncExitStack, *, address: str, port: int, tls: ssl.SSLContext | None = None
+    host: Host[Any],
+    stack: AsyncExitStack,
+    *,
+    address: str,
+    port: int,
+    tls: ssl.SSLContext | None = None,
+    scheme: str = "tcp",
 ) -> str:
-    """A TCP port, as a serial server has it; returns its URL."""
+    """A TCP port, as a serial server has it; returns its URL, with the scheme that the host makes of it."""
     loop = asyncio.get_running_loop()
-    server = await loop.create_server(lambda: Connection(host), address, port, ssl=tls)
+    place = Port(host, tls, scheme)
+    server = await loop.create_server(lambda: Connection(place), address, port)
     stack.push_async_callback(server.wait_closed)
+    stack.push_async_callback(place.aclose)
     stack.callback(server.close)
-    return url_of("tcp", server.sockets[0].getsockname())
+    return url_of(f"{scheme}s" if tls and scheme == "ws" else scheme, server.sockets[0].getsockname())
+
+
+@dataclass(eq=False, slots=True)
+class Port(Generic[P]):
+    """What the connections of one TCP port share.
+
+    Attributes:
+        host: Who is reached.
+        tls: What TLS needs, None for none.
+        scheme: What the URL of a client begins with.
+        handshakes: Those whose TLS is not agreed upon yet.
+        closed: Whether nobody is taken any more, not even who has been accepted already.
+    """
+
+    host: Host[P]
+    tls: ssl.SSLContext | None
+    scheme: str
+    handshakes: set[Handshake] = field(default_factory=set)
+    closed: bool = False
+
+    async def aclose(self) -> None:
+        """Ends those whose TLS is not agreed upon yet."""
+        self.closed = True
+        for handshake in list(self.handshakes):
+            await cancel_and_join(handshake)
 
 
 async def on_udp(
@@ -74,12 +112,12 @@ async def on_udp(
     address: str,
     port: int,
     admit: Callable[[bytes, bool], bytes | None] = lambda data, _known: data,
-    evict: bool = True,
+    crowded: Callable[[str], None] | None = None,
 ) -> str:
     """A UDP port, as the arm's Wi-Fi has it; returns its URL. See `Datagrams`."""
     loop = asyncio.get_running_loop()
     transport, _ = await loop.create_datagram_endpoint(
-        lambda: Datagrams(host, admit=admit, evict=evict), local_addr=(address, port)
+        lambda: Datagrams(host, admit=admit, crowded=crowded), local_addr=(address, port)
     )
     stack.callback(transport.close)
     return url_of("udp", transport.get_extra_info("sockname"))
@@ -92,26 +130,50 @@ def url_of(scheme: str, name: tuple[Any, ...]) -> str:
 
 
 class Connection(asyncio.Protocol, Generic[P]):
-    """One TCP client."""
+    """One TCP client.
 
-    def __init__(self, host: Host[P]) -> None:
-        self._host = host
+    The host hears of it before TLS is agreed upon, so that who never does it counts as well.
+
+    Args:
+        port: Where it has connected.
+    """
+
+    def __init__(self, port: Port[P]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._port = port
+        self._handshake: Handshake | None = None
+        self._early = bytearray()
+        self._lost = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client has connected."""
         self._transport = cast(asyncio.Transport, transport)
+        if self._port.closed:
+            self._lost = True
+            self._transport.abort()
+            return
+
         self._held = self._full = False
         connection = transport.get_extra_info("socket")
         keep_alive(connection)
-        self._watch = PeerWatch(connection, lambda _: self._transport.abort())
-        name = url_of("tcp", transport.get_extra_info("peername"))
-        self._client = self._host.client(
-            self._transport.write, self._transport.abort, ordered=True, hold=self._hold, name=name
-        )
+        self._watch = PeerWatch(connection, lambda _: self._hang_up())
+        name = url_of(self._port.scheme, transport.get_extra_info("peername") or ("?", 0))
+        if self._port.tls:
+            agree = self._loop.start_tls(
+                self._transport, self, self._port.tls, server_side=True, ssl_handshake_timeout=TLS_WITHIN
+            )
+            self._handshake = self._loop.create_task(agree, name=f"dobot_async TLS with {name}")
+            self._handshake.add_done_callback(self._agreed)
+            self._port.handshakes.add(self._handshake)
+
+        self._client = self._port.host.client(self._write, self._hang_up, ordered=True, hold=self._hold, name=name)
 
     def data_received(self, data: bytes) -> None:
         """It has sent something."""
-        self._client.send(data)
+        if self._handshake:
+            self._early += data  # it was quicker than the task that exchanges the transports
+        else:
+            self._client.send(data)
 
     def pause_writing(self) -> None:
         """It does not read; what it asks meanwhile waits in the line."""
@@ -125,14 +187,47 @@ class Connection(asyncio.Protocol, Generic[P]):
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - it does not matter why
         """It has gone."""
-        self._watch.stop()
-        self._host.leave(self._client)
+        if not self._lost:
+            self._lost = True
+            self._watch.stop()
+            self._port.host.leave(self._client)
+
+    def _agreed(self, handshake: Handshake) -> None:
+        """Go on with what stands in place of the plain connection when TLS is agreed upon; else end it."""
+        self._port.handshakes.discard(handshake)
+        self._handshake = None
+        error = None if handshake.cancelled() else handshake.exception()
+        secure = None if handshake.cancelled() or error else handshake.result()
+        if secure is None or self._lost:
+            (secure or self._transport).abort()
+            self.connection_lost(None)
+        else:
+            self._transport = secure
+            self._flow()
+            if self._early:
+                self._client.send(bytes(self._early))
+
+        if error and not isinstance(error, OSError):
+            raise error  # OSError: it speaks no TLS, or has gone; there is no client to tell
+
+    def _write(self, data: bytes) -> None:
+        if not self._handshake and not self._lost:
+            self._transport.write(data)
+
+    def _hang_up(self) -> None:
+        if self._handshake:
+            self._handshake.cancel()
+        else:
+            self._transport.abort()
 
     def _hold(self, held: bool) -> None:
         self._held = held
         self._flow()
 
     def _flow(self) -> None:
+        if self._handshake:
+            return
+
         if self._held or self._full:
             self._transport.pause_reading()
         else:
@@ -140,21 +235,25 @@ class Connection(asyncio.Protocol, Generic[P]):
 
 
 class Datagrams(asyncio.DatagramProtocol, Generic[P]):
-    """All UDP clients, each known by its address.
+    """All UDP clients, each known by its address; a handful at a time.
 
     Args:
         host: Who is reached.
         admit: Called with each datagram, and whether its sender is known; returns what the host gets of it, None for
             nothing, which makes nobody a client.
-        evict: Whether one more than a handful takes the place of the first, or is ignored.
+        crowded: Called with who is ignored because there are enough; None lets one more take the place of the first.
     """
 
     def __init__(
-        self, host: Host[P], *, admit: Callable[[bytes, bool], bytes | None] = lambda data, _: data, evict: bool = True
+        self,
+        host: Host[P],
+        *,
+        admit: Callable[[bytes, bool], bytes | None] = lambda data, _: data,
+        crowded: Callable[[str], None] | None = None,
     ) -> None:
         self._host = host
         self._admit = admit
-        self._evict = evict
+        self._crowded = crowded
         self._clients: dict[Any, P] = {}
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -169,7 +268,8 @@ class Datagrams(asyncio.DatagramProtocol, Generic[P]):
 
         if addr not in self._clients:
             if len(self._clients) == MANY:
-                if not self._evict:
+                if self._crowded:
+                    self._crowded(url_of("udp", addr))
                     return
 
                 self._forget(next(iter(self._clients)))

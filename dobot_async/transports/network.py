@@ -7,6 +7,7 @@ like any other, one request is under way at a time, and a lost one is silence.
 from __future__ import annotations
 
 import ssl
+from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult
 
@@ -17,44 +18,75 @@ from dobot_async.transports.base import Option, StreamTransport, Transport, numb
 from dobot_async.transports.byte_stream import WINDOW
 from dobot_async.transports.tcp import connect
 
-__all__ = ["CA", "TOKEN", "UDP_PORT", "WINDOW", "open_url", "secret", "trust"]
+__all__ = ["CA", "LONGEST_TOKEN", "TOKENS", "UDP_PORT", "WINDOW", "open_url", "secret", "token_in", "token_of", "trust"]
 
 UDP_PORT = 8899
 REORDER_WINDOW = 0.015  # seconds; one access point keeps datagrams in order, and doubles them within a few milliseconds
 TOKEN_LINE = b"TOKEN %s\n"
 SYSTEM = "system"
+LONGEST_TOKEN = 200
+"""Characters; with a frame behind it a token still fits into one datagram of any network."""
 
 
 def secret(token: str) -> str:
-    """Return a token as it may be presented; raise ValueError for one that is no word."""
-    if not token.isascii() or not token.isprintable() or not token or " " in token:
+    """Return a token as it may be presented; raise ValueError for one that is no word, or too long."""
+    if not token.isascii() or not token.isprintable() or not 0 < len(token) <= LONGEST_TOKEN or " " in token:
         raise ValueError
 
     return token
 
 
-TOKEN = Option(secret, "a word of printable ASCII without blanks", secret=True)
+def token_in(file: str | Path) -> str:
+    """Return the token in a file, blanks and ends of lines around it left out.
+
+    Raises:
+        ValueError: There is no such file, or no token in it; the message shows nothing of what is.
+    """
+    try:
+        return secret(Path(file).read_bytes().decode("ascii").strip())
+    except OSError as error:
+        raise ValueError(f"cannot read the token file {file}: {error.strerror}") from None
+    except ValueError:
+        raise ValueError(f"{file} has no token: {TOKEN.expected}") from None
+
+
+def token_of(given: dict[str, Any]) -> str | None:
+    """Take `token` or `token_file` out of the options of a URL; return the token, None if there is none."""
+    file = given.pop("token_file", None)
+    if file is not None and "token" in given:
+        raise ValueError("give token or token_file, not both")
+
+    token: str | None = given.pop("token", None)
+    return token if file is None else token_in(file)
+
+
+TOKEN = Option(secret, f"a word of printable ASCII without blanks, {LONGEST_TOKEN} characters at most", secret=True)
+TOKENS = {"token": TOKEN, "token_file": Option(words, "a file with the token")}
 CA = Option(words, "a PEM file, or system")
 OPTIONS: dict[str, dict[str, Option]] = {
-    "udp": {"reorder_window": number(float, "seconds", least=0, most=10), "token": TOKEN},
-    "tcp": {"ca": CA, "token": TOKEN},
+    "udp": {"reorder_window": number(float, "seconds", least=0, most=10), **TOKENS},
+    "tcp": {"ca": CA, **TOKENS},
 }
 
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
     """Open `udp://host[:8899]` or `tcp://host:port`.
 
-    Both take `?token=`, which a bridge asks for. `?reorder_window=` says if a network is worse than `REORDER_WINDOW`;
-    `?ca=` turns TLS on: a PEM file with the certificate to trust, or "system" for those that the computer trusts.
+    Both take `?token=` or `?token_file=`, which a bridge asks for. `?reorder_window=` says if a network is worse than
+    `REORDER_WINDOW`; `?ca=` turns TLS on: a PEM file with the certificate to trust, or "system" for those that the
+    computer trusts.
     """
     given = options(url, OPTIONS[url.scheme])
+    token = token_of(given)
     host = url.hostname
     port = UDP_PORT if url.scheme == "udp" and url.port is None else url.port
-    if not host or not port or url.path.strip("/"):
-        raise ValueError(f"expected {'udp://host' if url.scheme == 'udp' else 'tcp://host:port'}")
+    if not host or not port or url.path.strip("/") or "@" in url.netloc:
+        raise ValueError(
+            f"expected {'udp://host' if url.scheme == 'udp' else 'tcp://host:port'}, and ?token= for a token"
+        )
 
     try:
-        return await (reach_udp if url.scheme == "udp" else reach_tcp)(host, port, **given)
+        return await (reach_udp if url.scheme == "udp" else reach_tcp)(host, port, token=token, **given)
     except OSError as error:
         raise ConnectFailed(
             f"cannot reach {url.scheme}://{url.netloc}: {str(error) or 'it hung up'}; is the address right, "

@@ -13,7 +13,7 @@ import anyio
 from dobot_async.errors import ConnectFailed
 from dobot_async.transports.base import MANY, Transport, options
 from dobot_async.transports.keep_alive import keep_alive
-from dobot_async.transports.network import CA, TOKEN, WINDOW, trust
+from dobot_async.transports.network import CA, TOKENS, WINDOW, token_of, trust
 
 __all__ = ["WebSocketTransport", "open_url", "quiet", "websockets"]
 
@@ -22,22 +22,23 @@ PING, PONG_WITHIN = (
     6.0,
 )  # seconds; so a computer that is gone is noticed where the system does not notice it earlier
 CLOSE = 0.5
-OPTIONS = {"ws": {"token": TOKEN}, "wss": {"token": TOKEN, "ca": CA}}
+OPTIONS = {"ws": TOKENS, "wss": {**TOKENS, "ca": CA}}
 UNAUTHORIZED = 401
 
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
-    """Open `ws://host:port` or `wss://host:port`; both take `?token=`, and wss `?ca=` as tcp does."""
+    """Open `ws://host:port` or `wss://host:port`; both take `?token=` or `?token_file=`, wss `?ca=` as tcp."""
     given = options(url, OPTIONS[url.scheme])
-    if not url.hostname or url.port == 0 or url.path.strip("/"):
-        raise ValueError(f"expected {url.scheme}://host:port")
+    token = token_of(given)
+    if not url.hostname or url.port == 0 or url.path.strip("/") or "@" in url.netloc:
+        raise ValueError(f"expected {url.scheme}://host:port, and ?token= for a token")
 
     client = websockets("client")
     place = f"{url.scheme}://{url.netloc}"
     try:
         socket = await client.connect(
             place,
-            additional_headers={"Authorization": f"Bearer {given['token']}"} if "token" in given else {},
+            additional_headers={"Authorization": f"Bearer {token}"} if token else {},
             ssl=trust(given.get("ca")) if url.scheme == "wss" else None,
             compression=None,
             ping_interval=PING,
@@ -60,12 +61,12 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 
 def websockets(module: str) -> ModuleType:
     """Return a module of the websockets library; raise ConnectFailed where it is not installed."""
     try:
-        from websockets import exceptions  # noqa: PLC0415 - only who uses WebSocket needs it
-        from websockets.asyncio import client, server  # noqa: PLC0415
+        from websockets import exceptions, frames, server  # noqa: PLC0415 - only who uses WebSocket needs it
+        from websockets.asyncio import client  # noqa: PLC0415
     except ImportError:
         raise ConnectFailed("ws:// needs the package websockets: pip install 'dobot-async[bridge]'") from None
 
-    return {"client": client, "server": server, "exceptions": exceptions}[module]
+    return {"client": client, "server": server, "exceptions": exceptions, "frames": frames}[module]
 
 
 def quiet() -> logging.Logger:

@@ -19,7 +19,7 @@ from dobot_async.transports.base import Option, options, words
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["Place", "address", "library", "reason"]
+__all__ = ["NAME", "Place", "address", "library", "reason"]
 
 GONE = {
     "transport/unicast/open_timeout": (10_000, 3000),  # milliseconds
@@ -29,7 +29,7 @@ GONE = {
 """After what time somebody who does not answer, says nothing, or reads nothing counts as gone: Zenoh's, and ours."""
 RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 CONFIGURATION = "ZENOH_CONFIG"
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 WHERE_IN_ZENOH = re.compile(r" at /\S+\.rs:\d+\.?")
 OWN = {"mode": "peer", "connect/retry": RETRY}
 NOBODY: dict[str, list[str]] = {"router": [], "peer": [], "client": []}
@@ -84,7 +84,7 @@ class Place:
         """
         found = options(url, CLIENT | SERVER if serving else CLIENT)
         if not NAME.fullmatch(url.netloc) or url.path.strip("/"):
-            raise ValueError("expected zenoh://name, of letters, digits, dots, - and _")
+            raise ValueError("expected zenoh://name, of letters, digits, dots, - and _, 100 at most")
 
         return cls(url.netloc, **found)
 

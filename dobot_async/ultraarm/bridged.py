@@ -11,14 +11,15 @@ plain text that the arm says without being asked is a frame of another key, so t
 
 from __future__ import annotations
 
+import asyncio
 import math
-import time
-from collections.abc import Callable, Hashable
-from dataclasses import asdict
+import re
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from dobot_async._core.link.link import Link
-from dobot_async.bridged import Kind, Reading
+from dobot_async.bridged import Kind, Reading, Switch
 from dobot_async.contract import Parser
 from dobot_async.errors import ProtocolError
 from dobot_async.transports import Transport
@@ -35,45 +36,83 @@ ANSWER = 1.5  # seconds that an answer to an unknown line may take
 SILENCE = 5.0  # the same for a reading, which may have to wait until somebody else's line was given up
 BEGINS = 0.1  # seconds within which a motion begins
 CALIBRATION = (c.SET_GRIPPER_ZERO, c.SET_GRIPPER_CLOSE_POSITION, c.CALIBRATE_J1, c.SET_SERVO_REGISTER)
+FIRST_WORD = re.compile(rb"\s*[A-Z][ \t]*\d", re.IGNORECASE)
+PART_OF_A_WORD = re.compile(rb"\s*([A-Z][ \t]*)?", re.IGNORECASE)
 STOPS = frozenset({c.JOG_STOP, c.RELEASE})
 JOGS = frozenset({c.JOG_JOINT, c.JOG_COORD})
 
 
 class UltraArmWatch:
-    """What one program has made the arm do: it moves until it rests and nothing waits in its queue."""
+    """What one program has made the arm do: it moves until it rests and nothing waits in its queue.
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    Laser and PWM wait in the queue as motions do, and a stop may throw them away: see `Switch`.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
         self.question = question(c.GET_STATUS)
         self._clock = clock
-        self._told = self._laser = self._pwm = False
+        self._told = False
+        self._switches = {c.LASER_ON.name: Switch(), c.SET_PWM.name: Switch()}
         self._begins_by = -math.inf
 
     def sent(self, request: Line) -> None:
         """A request that is no read goes out."""
         row, value = understood(request)
+        switch = SWITCHED.get(row) if row else None
         if row in STOPS:
             self._begins_by = -math.inf
-        elif row in {c.LASER_ON, c.LASER_OFF}:
-            self._laser = row is c.LASER_ON
-        elif row is c.SET_PWM:
-            self._pwm = value != c.PWM(0)
+            for each in self._switches.values():
+                each.empty()
+        elif row and switch and switch.on(value):
+            self._switches[switch.name].switch_on(queued=True)
         elif row is None or row.moves or row in JOGS or row is c.WAIT:
             self._told = True
             self._begins_by = self._clock() + BEGINS
 
-    def answered(self, request: Line, reply: Line) -> None:
-        """It was answered, which does not say that it is done."""
+    def answered(self, request: Line, reply: Line) -> None:  # noqa: ARG002 - whatever it was
+        """It was answered, which does not say that it is done; but an "off" is in the queue."""
+        row, value = understood(request)
+        switch = SWITCHED.get(row) if row else None
+        if switch and not switch.on(value):
+            self._switches[switch.name].switch_off(queued=True)
 
     def moving(self, reply: Line | None) -> bool:
         """Return whether the arm is, or may be, in the middle of what it was told; `reply` is that to the question."""
-        if self._laser or self._pwm or not self._told:
-            return self._laser or self._pwm
+        if any(switch.is_on(finished=True) for switch in self._switches.values()):
+            return True
+
+        if not self._told and not any(switch.is_on(finished=False) for switch in self._switches.values()):
+            return False
 
         if reply is None or self._clock() < self._begins_by:
             return True
 
         status = STATUS_LAYOUT.decode(reply.params)
         return status.queue_size > 0 or not status.at_rest
+
+    def off(self) -> Sequence[Line]:
+        """Return nothing but what `stopping` has."""
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Switched:
+    """What a row switches.
+
+    Attributes:
+        name: The row that switches it on.
+        on: Whether it does, with its parameters.
+    """
+
+    name: str
+    on: Callable[[Any], bool]
+
+
+SWITCHED: Mapping[Command[Any, Any], Switched] = {
+    c.LASER_ON: Switched(c.LASER_ON.name, lambda _: True),
+    c.LASER_OFF: Switched(c.LASER_ON.name, lambda _: False),
+    c.SET_PWM: Switched(c.SET_PWM.name, lambda value: bool(value != c.PWM(0))),
+}
 
 
 class BridgedUltraArm:
@@ -113,6 +152,13 @@ class BridgedUltraArm:
         """Return a parser for a client's stream."""
         return Requests()
 
+    def begins(self, data: bytes) -> bool | None:
+        """Return whether bytes begin with a letter and a number, as all lines do; None while they may yet do so."""
+        if FIRST_WORD.match(data):
+            return True
+
+        return None if PART_OF_A_WORD.fullmatch(data) else False
+
     def attach(self, link: Link[Line], parser: Parser[Line]) -> None:
         """Let the parser know what is asked."""
         if isinstance(parser, Answers):
@@ -120,7 +166,7 @@ class BridgedUltraArm:
 
     def watch(self) -> UltraArmWatch:
         """Return what follows one program."""
-        return UltraArmWatch()
+        return UltraArmWatch(asyncio.get_running_loop().time)
 
     def kind(self, request: Line) -> Kind:
         """Return what a request is; a line that is not wholly understood is a write."""
@@ -178,10 +224,12 @@ class BridgedUltraArm:
         return f"ERROR: {' '.join(reason.split())}\r\n".encode("ascii", "replace")
 
     def check(self, request: Line) -> None:
-        """Raise ProtocolError for what is no line, or holds several commands."""
-        words = words_of(request)
-        row, _ = understood(request)
-        if not words or (row is None and sum(letter in "GM" for letter, _ in words) > 1):
+        """Raise ProtocolError for what is no line, or not just one command with a whole number.
+
+        Whoever reads a line in another way than the arm does cannot say what is denied.
+        """
+        commands = [word[1:] for letter, word in words_of(request) if letter in "GM"]
+        if len(commands) != 1 or not commands[0].isdigit():
             raise ProtocolError("COMMAND NOT RECOGNIZED: expected one command, letters with numbers")
 
 

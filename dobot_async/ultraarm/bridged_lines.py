@@ -183,12 +183,24 @@ class Answers:
 
 
 def words_of(request: Line) -> list[tuple[str, str]]:
-    """The words of a request's first line, each as its letter and as a whole: [("G", "G0"), ("X", "X200")]."""
+    """The words of a request's first line, each as its letter and as a whole: [("G", "G0"), ("X", "X200")].
+
+    The number of a command is written in one way, for an arm may take M31.0, M+31 and M031 for M31 as well.
+    """
     with suppress(ValueError):
-        words = split_words(request.text.split(END)[0])
-        return [(letter, letter + (str(int(number)) if number.isdigit() else number)) for letter, number in words]
+        return [(letter, letter + plain(number)) for letter, number in split_words(request.text.split(END)[0])]
 
     return []
+
+
+def plain(number: str) -> str:
+    """A whole number that is not negative, in digits alone; any other as it is."""
+    with suppress(ValueError, OverflowError):
+        value = float(number)
+        if value == int(value) and value >= 0:
+            return str(int(value))
+
+    return number
 
 
 def understood(request: Line) -> tuple[Command[Any, Any] | None, Any]:

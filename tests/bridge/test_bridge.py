@@ -91,7 +91,8 @@ async def test_without_an_arm_it_does_not_begin() -> None:
         ("a place to listen", {"listen": []}),
         ("deny", {"deny": ["everything"]}),
         ("on_vanish", {"on_vanish": "wait"}),
-        ("one word", {"token": "two words"}),
+        ("a word of printable ASCII", {"token": "two words"}),
+        ("200 characters at most", {"token": "x" * 201}),
         ("wss needs a certificate", {"listen": "wss://127.0.0.1:0"}),
         ("cannot use the certificate", {"certificate": "/nonexistent"}),
         ("certificate where there is a key", {"key": "/nonexistent"}),
@@ -312,6 +313,54 @@ async def test_a_stop_overtakes_and_drops_what_waits() -> None:
         assert len(rig.told("refused")) == 1
 
 
+async def test_a_client_is_answered_in_order_however_many_others_ask_the_same() -> None:
+    asked = [ask(c.GET_POSE), ask(c.GET_PTP_COMMON_PARAMS), ask(c.GET_POSE), ask(c.GET_DEVICE_NAME), set_now(50)]
+    async with bridged() as rig, client(rig.url) as one, AsyncExitStack() as stack:
+        rig.sim.faults.latency = 0.005
+        others = [await stack.enter_async_context(client(rig.url)) for _ in range(5)]
+
+        async def read(other: Plain) -> None:
+            while True:
+                await other.ask(c.GET_POSE)
+
+        reading = [asyncio.create_task(read(other)) for other in others]
+        try:
+            for _ in range(5):
+                await one.send(*asked)
+                assert [(await one.receive()).id for _ in asked] == [each.id for each in asked]
+        finally:
+            for task in reading:
+                task.cancel()
+
+            await asyncio.wait(reading)
+
+
+async def test_anybody_may_switch_off_what_burns_and_drops_nothing_of_the_mover() -> None:
+    laser, motors = c.EndEffectorLaser(True, True), [c.EMotor(index, False, 0) for index in (0, 1)]
+    async with bridged(speed=1.0) as rig, client(rig.url) as mover, client(rig.url) as other:
+        await mover.ask(c.SET_QUEUED_CMD_START_EXEC)
+        await mover.ask(c.SET_END_EFFECTOR_LASER, laser)
+        for index in (0, 1):
+            await mover.ask(c.SET_E_MOTOR, c.EMotor(index, True, 100))
+
+        rig.sim.faults.latency = 0.01
+        await mover.send(*[far(place) for place in range(5)])
+        await other.send(
+            ask(c.SET_END_EFFECTOR_LASER, c.EndEffectorLaser(False, False)),
+            *(ask(c.SET_E_MOTOR, off) for off in motors),
+        )
+        for _ in range(3):
+            await other.receive()
+
+        assert not rig.sim.arm.laser
+        assert [motor.speed for motor in rig.sim.arm.motors] == [0, 0]
+        for _ in range(5):
+            assert (await mover.receive()).id == far().id
+
+        assert not rig.told("refused")
+        assert not rig.told("cut")
+
+
 async def test_anybody_may_stop_and_whose_motion_it_was_is_told() -> None:
     async with bridged(speed=1.0) as rig, client(rig.url) as other:
         with pytest.raises(ConnectionLost):
@@ -474,7 +523,7 @@ async def flood(plain: Plain) -> None:
 
 
 async def talk_garbage(plain: Plain) -> None:
-    data = bytes(range(256)) + b"\xaa\xaa\x03" * 100
+    data = b"\xaa\xaa\x03" * 100 + bytes(range(256))
     while True:
         await plain.pour(data)
 
@@ -505,6 +554,7 @@ async def test_who_misbehaves_disturbs_nobody_else(listen: str, misbehave: Any) 
 
 async def test_garbage_without_end_is_cut() -> None:
     async with bridged(limits=Limits(junk=1000)) as rig, client(rig.url) as plain:
+        await plain.ask(c.GET_DEVICE_NAME)
         await plain.transport.send(bytes(2000))
         assert await plain.hung_up()
         assert rig.told("cut") == ["1024 bytes without a request among them"]

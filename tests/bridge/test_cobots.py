@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import pytest
 from bridge_rig import IN_TIME, TCP, until
+from virtual_ports import on_the_virtual_clock, virtual_ports
 
 from dobot_async import MotionStopped, MyCobot
 from dobot_async.bridge import Bridge, BridgeEvent, bridge
@@ -23,6 +24,8 @@ from dobot_async.mycobot.models import MODELS
 from dobot_async.simulator import MyCobotQuirks, Simulation, simulate
 from dobot_async.transports import Transport, open_transport
 from dobot_async.wire import Command
+
+__all__ = ["virtual_ports"]
 
 FAR = (90.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 NEW = MyCobotQuirks()
@@ -100,9 +103,19 @@ async def heard(transport: Transport) -> f.Frame:
 # One arm, several programs.
 
 
-@pytest.mark.parametrize("listen", [TCP, "udp://127.0.0.1:0", "pty"])
+@pytest.mark.parametrize("listen", ["udp://127.0.0.1:0", "pty"])
+async def test_a_program_moves_the_arm_through_it(listen: str) -> None:
+    await moves_through("mycobot280", listen)
+
+
+@on_the_virtual_clock
 @pytest.mark.parametrize("model", ["mycobot280", "myarm300", "mypalletizer260"])
-async def test_a_program_moves_the_arm_through_it(listen: str, model: str) -> None:
+async def test_a_program_moves_any_model_through_it(model: str) -> None:
+    await moves_through(model, TCP)
+
+
+async def moves_through(model: str, listen: str) -> None:
+    """Moves an arm by way of a bridge."""
     async with bridged(listen, model=model) as rig, MyCobot.connect(rig.bridge.url, model=model) as arm:
         target = (30.0, *(10.0,) * (arm.model.joints - 1))
         await arm.move_joints(*target)
@@ -111,6 +124,7 @@ async def test_a_program_moves_the_arm_through_it(listen: str, model: str) -> No
         assert rig.times(c.SEND_ANGLES) == 1
 
 
+@on_the_virtual_clock
 async def test_others_watch_while_one_moves_and_may_not_move() -> None:
     async with bridged() as rig, MyCobot.connect(rig.bridge.url) as arm, plain(rig.bridge.url) as other:
         async with MyCobot.connect(rig.bridge.url, control=False) as watcher:
@@ -126,6 +140,7 @@ async def test_others_watch_while_one_moves_and_may_not_move() -> None:
         assert rig.times(c.SEND_ANGLES) == 1
 
 
+@on_the_virtual_clock
 @pytest.mark.parametrize("quirks", [NEW, OLD], ids=["newer", "older"])
 async def test_a_program_that_vanishes_in_the_middle_of_a_motion_stops_the_arm(quirks: MyCobotQuirks) -> None:
     async with bridged(speed=1.0, quirks=quirks) as rig:
@@ -140,6 +155,7 @@ async def test_a_program_that_vanishes_in_the_middle_of_a_motion_stops_the_arm(q
         assert rig.times(c.SEND_ANGLES) == 1
 
 
+@on_the_virtual_clock
 async def test_a_program_that_has_finished_may_go() -> None:
     async with bridged() as rig:
         async with plain(rig.bridge.url) as mover:
@@ -151,6 +167,7 @@ async def test_a_program_that_has_finished_may_go() -> None:
         assert rig.times(c.STOP) == 0
 
 
+@on_the_virtual_clock
 async def test_anybody_may_stop_and_the_mover_hears_of_it() -> None:
     async with bridged(speed=1.0) as rig, MyCobot.connect(rig.bridge.url, on_error="leave") as arm:
         motion = await arm.queue.move_joints(*FAR, speed=20)
@@ -165,6 +182,7 @@ async def test_anybody_may_stop_and_the_mover_hears_of_it() -> None:
         assert rig.sim.arm.joints[0] < 80
 
 
+@on_the_virtual_clock
 async def test_half_a_frame_and_garbage_disturb_nobody() -> None:
     async with bridged() as rig, plain(rig.bridge.url) as other, MyCobot.connect(rig.bridge.url) as arm:
         await other.send(frame(c.SEND_ANGLES, c.JointsMove(FAR, 50))[:7])
@@ -176,6 +194,7 @@ async def test_half_a_frame_and_garbage_disturb_nobody() -> None:
         assert rig.sim.arm.counters.dropped == rig.sim.arm.counters.unfit == 0
 
 
+@on_the_virtual_clock
 async def test_an_arm_that_acknowledges_nothing_is_told_once_and_nothing_is_refused() -> None:
     async with bridged(quirks=OLD) as rig, MyCobot.connect(rig.bridge.url, acknowledges=False) as arm:
         await arm.move_joints(20, 0, 0, 0, 0, 0)
@@ -184,6 +203,7 @@ async def test_an_arm_that_acknowledges_nothing_is_told_once_and_nothing_is_refu
         assert not rig.told("refused")
 
 
+@on_the_virtual_clock
 async def test_calibration_can_be_denied() -> None:
     async with bridged(deny=["calibration"]) as rig, plain(rig.bridge.url) as other:
         await other.send(frame(c.SET_SERVO_CALIBRATION, 1))

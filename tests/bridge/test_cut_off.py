@@ -18,7 +18,8 @@ from websockets.asyncio.client import connect
 
 from dobot_async import Magician
 from dobot_async.bridge import Limits
-from dobot_async.bridge.doors import STRANGERS, Doors
+from dobot_async.bridge.doors import Doors
+from dobot_async.bridge.handshake import PENDING
 from dobot_async.magician import commands as c
 from dobot_async.magician.frame import encode
 
@@ -39,14 +40,12 @@ async def test_what_still_waits_of_a_client_that_is_cut_off_is_forgotten(listen:
         await until(lambda: len(rig.told("left")) == 2)
 
 
-async def test_strangers_who_say_nothing_are_a_few_at_a_time_and_keep_nobody_out() -> None:
+async def test_who_says_nothing_makes_room_for_others() -> None:
     async with bridged("ws://127.0.0.1:0", token="geheim") as rig, AsyncExitStack() as stack:
-        for _ in range(STRANGERS):
-            await stack.enter_async_context(connect(rig.url))
-
+        first, *_ = [await stack.enter_async_context(connect(rig.url)) for _ in range(PENDING)]
         assert not rig.told("turned away")
-        one_more = await stack.enter_async_context(connect(rig.url))
-        await one_more.wait_closed()
+        await stack.enter_async_context(connect(rig.url))
+        await first.wait_closed()
         assert len(rig.told("turned away")) == 1
         async with Magician.connect(f"{rig.url}?token=geheim", control=False) as arm:
             assert await arm.get_pose()

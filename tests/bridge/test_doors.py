@@ -85,7 +85,7 @@ async def test_the_line_may_come_in_pieces_and_with_the_first_request() -> None:
 
 
 async def test_who_says_nothing_is_hung_up_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dobot_async.bridge.doors.FIRST_LINE", 0.05)
+    monkeypatch.setattr("dobot_async.bridge.handshake.HANDSHAKE", 0.05)
     async with bridged(token=TOKEN) as rig, client(rig.url) as plain:
         assert await plain.hung_up()
         assert rig.told("turned away") == ["it has not said its token in time"]
@@ -110,7 +110,7 @@ async def test_a_sender_of_datagrams_is_known_once_it_has_said_the_token() -> No
         assert (await plain.ask(c.GET_DEVICE_NAME)).id == NAME.id
         await plain.transport.send(b"TOKEN wrong\n" + encode(NAME))
         assert (await plain.ask(c.GET_POSE)).id == c.GET_POSE.id
-        assert len(rig.told("turned away")) == 1
+        assert len(rig.told("turned away")) == 2
 
 
 @pytest.mark.parametrize(

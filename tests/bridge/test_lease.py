@@ -38,12 +38,12 @@ class FakeLine:
         self._looks += 1
         return Frame(c.IS_MOVING.id, bytes([self.moving and self._looks - 1 not in self._spoilt]))
 
-    async def stop(self, _: Sequence[Frame]) -> bool:
+    async def stop(self, frames: Sequence[Frame]) -> list[bool]:
         """Stops the arm, if that is not lost on the way; it is never acknowledged."""
         await asyncio.sleep(1)
         self._lost -= 1
         self.moving = self.moving and self._lost >= 0
-        return False
+        return [False] * len(frames)
 
 
 @pytest.mark.parametrize("lost", [0, 1, 3])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -218,9 +218,9 @@ class Stranger:
         self.link = f"dobot/{name}/@link/{own.zid()}"
         self.heard = keep(own, f"{self.link}/down")
 
-    async def enter(self, introduction: bytes = b'{"version": 1, "who": "stranger"}') -> str:
+    async def enter(self, introduction: bytes = b'{"version": 1, "who": "stranger"}', tries: int = 100) -> str:
         """The answer to the question whether it may come in."""
-        for _ in range(100):
+        for _ in range(tries):
             replies = await asyncio.to_thread(self._get, introduction)
             if replies and "not been seen" not in replies[0]:
                 return replies[0]
@@ -268,7 +268,7 @@ async def test_a_message_that_is_lost_ends_the_connection() -> None:
 async def test_who_shows_no_token_or_speaks_otherwise_is_not_let_in() -> None:
     async with bridged(place()) as rig, session(rig.url) as own:
         stranger = Stranger(own)
-        assert await stranger.enter() == "no answer"
+        assert await stranger.enter(tries=10) == "no answer"
         stranger.send(0, encode(far()))
         assert await stranger.ended() == "its connection has ended"
         token = own.liveliness().declare_token(stranger.link)
@@ -349,12 +349,48 @@ async def test_an_introduction_that_is_a_bomb_is_none() -> None:
 async def test_who_is_no_client_is_not_answered_without_end() -> None:
     async with bridged(place()) as rig, session(rig.url) as own, Magician.connect(rig.url) as mover:
         stranger = Stranger(own)
+        token = own.liveliness().declare_token(stranger.link)
         for number in range(2000):
             stranger.send(number, GET_POSE)
 
         await until(lambda: stranger.heard)
         await mover.move_to(220, 0, 40)
         assert len(stranger.heard) < 1000
+        withdraw(token)
+
+
+async def test_a_name_that_is_everybody_ends_nobody() -> None:
+    async with bridged(place()) as rig, session(rig.url) as own, Magician.connect(rig.url) as mover:
+        token = own.liveliness().declare_token("dobot/left/@link/*")
+        told = keep(own, "dobot/left/@link/*/down")
+        for name in ("*", "**", "$*"):
+            with suppress(zenoh.ZError):
+                own.put(f"dobot/left/@link/{name}/up", b"x")
+
+        await mover.move_to(220, 0, 40)
+        await mover.get_pose()
+        assert not [key for key, _ in told if "*" in key]
+        withdraw(token)
+
+
+async def test_of_two_servers_of_one_name_that_begin_together_one_serves() -> None:
+    router = endpoint()
+    async with session(mode="router", listen__endpoints=[router]), AsyncExitStack() as stack:
+        begun = await asyncio.gather(
+            *(stack.enter_async_context(bridged(f"zenoh://left?connect={router}")) for _ in range(3)),
+            return_exceptions=True,
+        )
+        failed = [each for each in begun if isinstance(each, BaseException)]
+        assert len(failed) == 2
+        assert all(isinstance(each, ConnectFailed) for each in failed)
+        async with Magician.connect(f"zenoh://left?connect={router}", control=False) as arm:
+            assert await arm.get_pose()
+
+
+@pytest.mark.parametrize("token", ["evil\x1b[31m/@arm/magician/1", "x\ny/@arm/magician/2", "left/@arm/m\x1b[2J/3"])
+def test_a_name_that_a_terminal_would_obey_is_no_arm(token: str) -> None:
+    assert ZenohArms()._found(f"dobot/{token}") is None
+    assert ZenohArms()._found("dobot/left/@arm/magician/1234abcd")
 
 
 async def test_a_server_that_goes_while_it_lets_somebody_in_has_just_gone() -> None:
@@ -378,7 +414,8 @@ async def test_a_server_that_goes_while_it_lets_somebody_in_has_just_gone() -> N
 # --- names ---
 
 
-async def test_an_arm_that_is_not_there() -> None:
+async def test_an_arm_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dobot_async.transports.zenoh.PRESENT", 0.3)
     async with bridged(place()) as rig:
         with pytest.raises(ConnectFailed, match="no arm called right is on Zenoh"):
             await open_transport(rig.url.replace("left", "right"), arm="magician")

@@ -64,6 +64,12 @@ def runtime() -> None:
 
 
 @pytest.fixture(autouse=True)
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is waited for at the end, once somebody does not read, is short."""
+    monkeypatch.setattr("dobot_async.transports.zenoh_session.CLOSED", 0.5)
+
+
+@pytest.fixture(autouse=True)
 def ended() -> Iterator[None]:
     yield
     processes_ended()

@@ -141,6 +141,27 @@ async def test_a_watcher_sees_everything_and_cannot_move_the_arm() -> None:
             assert {each.command for each in rig.sim.arm.executed} & {c.SET_JOG_CMD} == set()
 
 
+async def test_a_watcher_cannot_pass_for_an_arm_and_lock_out_who_may_move_it() -> None:
+    where = endpoint()
+    watcher = {"user": "watcher", "password": "battery-staple"}
+    async with served("access", where) as rig:
+        file = client_file("access", "watcher.json5", transport__auth__usrpwd=watcher, connect__endpoints=[where])
+        async with watching(file) as own:
+            (arm,) = await arms(own)
+            tokens = [own.liveliness().declare_token(key) for key in (arm, "dobot/left/@arm/magician/fa15e")]
+            overheard = keep(own, "dobot/left/@link/**")
+            await moves(f"zenoh://left?config=access-client.json5&connect={where}", rig)
+            assert not overheard
+            for token in tokens:
+                token.undeclare()  # type: ignore[no-untyped-call]
+
+
+async def arms(own: zenoh.Session) -> list[str]:
+    """The keys of the arms that a session sees."""
+    tokens = await asyncio.to_thread(lambda: list(own.liveliness().get("dobot/left/@arm/**", timeout=0.5)))
+    return [str(reply.ok.key_expr) for reply in tokens if reply.ok]
+
+
 async def links(file: str) -> list[str]:
     """The keys of those who are connected to the arm, as far as a session may see them."""
     async with watching(file) as own:

@@ -130,6 +130,20 @@ def test_options_are_what_connect_takes() -> None:
     assert member.options == {"reply_timeout": (0.05, 1), "window": 2, "reconnect": True, "on_error": "leave"}
 
 
+@pytest.mark.parametrize("family", ["magician", "mycobot", "ultraarm"])
+def test_every_family_has_its_reply_timeout(family: str) -> None:
+    """That of a myCobot depends on its URL, unless it is given."""
+    cell = f'{ARM}family = "{family}"\n'
+    (member,) = parse_cell(cell).members.values()
+    assert "reply_timeout" not in member.options
+    for text, value in (("[0.05, 1]", (0.05, 1)), ("0.5", 0.5)):
+        (member,) = parse_cell(f"{cell}options = {{ reply_timeout = {text} }}").members.values()
+        assert member.options["reply_timeout"] == value
+
+    with pytest.raises(ValueError, match="reply_timeout"):
+        parse_cell(f"{cell}options = {{ reply_timeout = 0 }}")
+
+
 def test_a_byte_order_mark_is_none_of_the_text(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(f"\ufeff{ARM}", encoding="utf-8")

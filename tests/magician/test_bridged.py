@@ -24,6 +24,15 @@ def queued(index: int | None = None) -> tuple[Frame, Frame]:
     return Frame(84, WRITE | QUEUED, PTP), Frame(84, WRITE | QUEUED, INDEX.encode(index or 0))
 
 
+FORCE_STOP, EMPTY = Frame(242, WRITE, b""), Frame(245, WRITE, b"")
+
+
+def do(watch: MagicianWatch, frame: Frame) -> None:
+    """A request and its answer."""
+    watch.sent(frame)
+    watch.answered(frame, frame)
+
+
 def told(index: int) -> Frame:
     return Frame(246, 0, INDEX.encode(index))
 
@@ -112,7 +121,8 @@ def test_the_arm_moves_until_the_last_index_is_reached() -> None:
     assert not watch.moving(told(5))
     assert not watch.moving(told(6))
     assert watch.moving(told(2**64 - 1))
-    watch.sent(Frame(245, WRITE, b""))
+    do(watch, FORCE_STOP)
+    do(watch, EMPTY)
     assert not watch.moving(None)
 
 
@@ -130,6 +140,53 @@ def test_what_has_no_index_goes_on_until_it_is_switched_off(on: Frame, off: Fram
     watch.sent(on)
     assert watch.moving(None)
     watch.sent(off)
+    assert watch.moving(None), "it may be lost on its way"
+    watch.answered(off, off)
+    assert not watch.moving(None)
+
+
+@pytest.mark.parametrize("halted", [False, True])
+def test_clearing_the_queue_ends_no_immediate_motion_and_not_surely_the_queued_one(halted: bool) -> None:
+    watch = MagicianWatch()
+    do(watch, Frame(84, WRITE, PTP))
+    do(watch, EMPTY)
+    assert watch.moving(None)
+    do(watch, FORCE_STOP)
+    assert not watch.moving(None)
+    request, reply = queued(3)
+    watch.sent(request)
+    watch.answered(request, reply)
+    if halted:
+        do(watch, FORCE_STOP)
+
+    do(watch, EMPTY)
+    assert watch.moving(None) is not halted
+
+
+def test_a_clear_that_was_not_answered_ends_nothing() -> None:
+    watch = MagicianWatch()
+    request, reply = queued(3)
+    watch.sent(request)
+    watch.answered(request, reply)
+    do(watch, FORCE_STOP)
+    watch.sent(EMPTY)
+    assert watch.moving(told(2))
+
+
+def test_the_pwm_of_each_pin_is_ended() -> None:
+    watch = MagicianWatch()
+    on = [Frame(132, WRITE, c.SET_IOPWM.request.encode(c.IOPWM(pin, 50, 7.5))) for pin in (4, 6)]
+    for frame in on:
+        do(watch, frame)
+
+    assert watch.moving(None)
+    assert [c.SET_IOPWM.request.decode(frame.params) for frame in watch.off()] == [
+        c.IOPWM(4, 1000, 0),
+        c.IOPWM(6, 1000, 0),
+    ]
+    for frame in watch.off():
+        do(watch, frame)
+
     assert not watch.moving(None)
 
 

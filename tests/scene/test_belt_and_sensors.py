@@ -117,6 +117,17 @@ async def test_a_colour_sensor_sees_the_nearest_piece(color: str, flags: tuple[i
         assert seen == [c.Color(0, 0, 0), c.Color(0, 0, 0), c.Color(*flags)]
 
 
+@virtual
+async def test_a_socket_without_a_colour_sensor_tells_nothing_of_another_one() -> None:
+    spot = ColorSpot((250, 0, -125), (350, 0, -125), port=ColorPort.GP4)
+    scene = Scene(pieces=[Piece("red", (290, 0), color="red")], sensors=[spot])
+    async with simulate(scene=scene, homed=True) as sim, Magician.connect(sim.url) as arm:
+        for port, seen in ((ColorPort.GP4, "red"), (ColorPort.GP2, ""), (ColorPort.GP4, "red")):
+            await arm.set_color_sensor(port)
+            await asyncio.sleep(0.5)
+            assert (await arm.get_color()).name == seen
+
+
 @pytest.mark.parametrize("plugged", c.AccessoryVersion)
 @pytest.mark.parametrize("switched", c.AccessoryVersion)
 @virtual
@@ -127,8 +138,8 @@ async def test_a_sensor_of_the_other_version_sees_nothing(
     spot = ColorSpot(beam.at, beam.to, version=plugged)
     scene = Scene(pieces=[Piece("red", (290, 0), color="red")], sensors=[beam, spot])
     async with simulate(scene=scene) as sim, Magician.connect(sim.url) as arm:
-        await arm.request(c.SET_INFRARED_SENSOR, c.InfraredSensor(enable=True, port=InfraredPort.GP4, version=switched))
-        await arm.request(c.SET_COLOR_SENSOR, c.ColorSensor(enable=True, port=ColorPort.GP2, version=switched))
+        await arm.set_infrared_sensor(InfraredPort.GP4, version=switched)
+        await arm.set_color_sensor(ColorPort.GP2, version=switched)
         await asyncio.sleep(0.5)
         fits = plugged is switched
         assert await arm.get_infrared(InfraredPort.GP4) == fits

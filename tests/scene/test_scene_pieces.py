@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any, assert_type
@@ -12,6 +14,7 @@ from virtual import virtual
 from dobot_async import ArmAlarm, Magician, MyCobot, PTPMode, UltraArm
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.simulator.scene import Block, CupTool, GripperTool, Mount, Piece, Scene, Workpiece
+from dobot_async.ultraarm import commands as ultra
 
 RED = Piece("red", (250, 0), color="red")
 ON_TABLE = -138.0 + 25 + 59.5  # where the arm has to be for the cup to touch the top of a piece on the table
@@ -20,13 +23,20 @@ ON_TABLE = -138.0 + 25 + 59.5  # where the arm has to be for the cup to touch th
 @asynccontextmanager
 async def cell(scene: Scene, mount: Mount | None = None, **details: Any) -> AsyncIterator[tuple[Simulation, Magician]]:
     async with simulate(scene=scene, mount=mount, **details) as sim, Magician.connect(sim.url) as arm:
-        await arm.set_rail()
         await arm.home()
         yield sim, arm
 
 
 def place(piece: Workpiece) -> Any:
     return pytest.approx(piece.position, abs=0.01)
+
+
+async def take(arm: Magician) -> None:
+    """Goes to where the red piece is in the beginning, and comes up with it, if it is there."""
+    await go_down(arm, 250, 0, ON_TABLE)
+    await arm.suction(True)
+    await arm.wait(0.3)
+    await arm.move_to(250, 0, 20)
 
 
 async def go_down(arm: Magician, x: float, y: float, z: float, r: float = 0.0) -> None:
@@ -196,8 +206,10 @@ async def test_a_closed_gripper_takes_nothing() -> None:
 async def test_the_arm_is_where_its_mount_says() -> None:
     """The arm stands turned by 90 degrees, on a rail that goes along x of the scene."""
     scene = Scene(pieces=[Piece("red", (800, 350))], table=0)
-    mount = Mount(1000, 100, 138, 90)
+    mount = Mount(1000, 100, 138, 90, rail_yaw=90)
     async with cell(scene, mount) as (_, arm):
+        await arm.set_rail()
+        await arm.home()
         await arm.move_to(250, 0, 20, l=200)
         await arm.move_to(250, 0, ON_TABLE, l=200)
         await arm.suction(True)
@@ -207,6 +219,76 @@ async def test_the_arm_is_where_its_mount_says() -> None:
         await arm.wait(0.3)
 
     assert place(scene.pieces["red"]) == (1000, 350, 0)
+
+
+@virtual
+async def test_an_arm_on_no_rail_stays_where_it_stands() -> None:
+    """Whatever its program says of a rail."""
+    scene = Scene(pieces=[RED])
+    async with cell(scene) as (sim, arm):
+        await arm.set_rail()
+        await arm.home()
+        await arm.move_to(250, 0, 20, l=200)
+        assert sim.arm.true_rail == pytest.approx(200)
+        await take(arm)
+
+    assert scene.pieces["red"].on == "tool of"
+
+
+@pytest.mark.parametrize(("mount", "at"), [(Mount(), (250, 0)), (Mount(rail_yaw=90), (250, 120))])
+@virtual
+async def test_an_arm_that_nobody_homed_goes_beside(mount: Mount, at: tuple[float, float]) -> None:
+    """Its base is turned by 8 degrees when it is switched on, and if it stands on a rail, it does so at 120 mm."""
+    scene = Scene(pieces=[RED])
+    async with simulate(scene=scene, mount=mount) as sim, Magician.connect(sim.url) as arm:
+        await take(arm)
+        assert scene.pieces["red"].on == "table"
+        await arm.suction(False)
+        await arm.wait(0.3)
+
+        radians = math.radians(8)
+        scene.put("red", at[0] * math.cos(radians), at[1] + 250 * math.sin(radians))
+        await take(arm)
+        assert scene.pieces["red"].on == "tool of"
+        await arm.suction(False)
+        await arm.wait(0.3)
+
+        scene.put("red", 250, 0)
+        await arm.set_rail()
+        await arm.home()
+        await take(arm)
+        assert scene.pieces["red"].on == "tool of"
+
+    assert not scene.crashes
+
+
+@virtual
+async def test_the_air_takes_its_time_and_nobody_has_to_look() -> None:
+    """The piece is taken and let go 0.2 s after the command, though nothing moves and nobody asks meanwhile."""
+    scene = Scene(pieces=[RED])
+    async with cell(scene) as (sim, arm):
+        await go_down(arm, 250, 0, ON_TABLE)
+        await arm.suction(True)
+        await asyncio.sleep(10)
+        assert scene.pieces["red"].on == "tool of"
+        await arm.move_to(250, 0, 20)
+        await arm.suction(False)
+        await asyncio.sleep(10)
+        assert scene.pieces["red"].on == "table"
+        switched = [each.finished for each in sim.arm.executed if each.name == "SetEndEffectorSuctionCup"]
+
+    assert [each.time for each in scene.events] == [pytest.approx(each + 0.2) for each in switched]
+
+
+@virtual
+async def test_a_cup_that_does_not_wait_for_the_air_leaves_the_piece() -> None:
+    scene = Scene(pieces=[RED])
+    async with cell(scene) as (_, arm):
+        await go_down(arm, 250, 0, ON_TABLE)
+        await arm.suction(True)
+        await arm.move_to(250, 0, 60)
+
+    assert scene.pieces["red"].on == "table"
 
 
 @virtual
@@ -252,6 +334,26 @@ async def test_an_ultraarm_carries_a_piece() -> None:
         await arm.move_to(200, 100, 80)
 
     assert place(scene.pieces["red"]) == (200, 100, -60)
+
+
+@virtual
+async def test_the_fingers_of_an_ultraarm_take_their_time() -> None:
+    """They are 30 mm apart, and come together at 50 percent of that a second: on 25 mm after a third of one."""
+    scene = Scene(pieces=[Piece("red", (240, 0))], table=-60)
+    mount = Mount(tool=GripperTool(opening=30))
+    async with simulate("ultraarm", scene=scene, mount=mount, homed=True) as sim, UltraArm.connect(sim.url) as arm:
+        await arm.gripper(False)
+        await arm.move_to(240, 0, 60)
+        await arm.move_to(240, 0, -60 + 12 + 59.5)
+        await arm.gripper(True, speed=100)
+        await arm.move_to(240, 0, 60)
+        assert scene.pieces["red"].on == "tool of"
+        (closed,) = (
+            each.finished for each in sim.arm.executed if each.command is ultra.SET_GRIPPER and not each.value.opening
+        )
+
+    (picked,) = scene.events
+    assert picked.time == pytest.approx(closed + 1 / 3, abs=0.01)
 
 
 @virtual

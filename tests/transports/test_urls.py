@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 import serial
 
 from dobot_async import ConnectFailed
-from dobot_async.transports import SCHEMES, open_transport
+from dobot_async.transports import SCHEMES, hidden, open_transport
 from dobot_async.transports.base import number, options
 
 NO_TIMES = ("nan", "inf", "-inf", "-1", "-1e-9", "1e400", "", "1,5", "5ms", "1_0", "%201", "\u0661")
@@ -152,3 +154,65 @@ async def test_the_path_of_a_port_is_taken_as_it_is(
         await open_transport(url, arm="magician")
 
     assert asked == [(path, baud)]
+
+
+@pytest.mark.parametrize(
+    ("url", "shown"),
+    [
+        ("tcp://h:1?token=geheim", "tcp://h:1?token=..."),
+        ("tcp://h:1?Token=geheim&a=1", "tcp://h:1?Token=...&a=1"),
+        ("tcp://h:1?a=1&%74oken=ge heim", "tcp://h:1?a=1&%74oken=..."),
+        ("tcp://h:1;token=geheim", "tcp://h:1;token=..."),
+        ("tcp://h:1?a=1;token=geheim#geheim", "tcp://h:1?a=1;token=..."),
+        ("ws://h:1#token=geheim?x", "ws://h:1#token=..."),
+        ("ws://me:geheim@h:1?token=geheim&token=geheim", "ws://...@h:1?token=...&token=..."),
+        ("zenoh://left?config=a.json5&password=geheim", "zenoh://left?config=a.json5&password=..."),
+        ("tcp://h:1?token_file=/etc/token&ca=b.pem", "tcp://h:1?token_file=/etc/token&ca=b.pem"),
+        ("serial:///dev/ttyUSB0?baud=115200", "serial:///dev/ttyUSB0?baud=115200"),
+    ],
+)
+def test_a_url_is_shown_without_what_is_secret_in_it(url: str, shown: str) -> None:
+    assert hidden(url) == shown
+
+
+@pytest.mark.parametrize("scheme", ["tcp", "ws", "wss", "udp"])
+def test_a_password_in_front_of_the_host_is_refused_and_not_shown(scheme: str) -> None:
+    message = refusal(f"{scheme}://me:geheim@10.0.0.1:1")
+    assert "?token=" in message
+    assert "geheim" not in message
+
+
+def test_a_token_in_the_wrong_place_is_not_shown_either() -> None:
+    assert "geheim" not in refusal("tcp://10.0.0.1:1;token=geheim")
+
+
+@pytest.mark.parametrize("content", [b"", b"two words", b"gehe\xffim", b"x" * 201, None])
+def test_a_token_file_without_a_token_is_refused_and_nothing_of_it_shown(content: bytes | None, tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    if content is not None:
+        file.write_bytes(content)
+
+    message = refusal(f"tcp://10.0.0.1:1?token_file={file}")
+    assert str(file) in message
+    assert "words" not in message
+
+
+def test_a_token_is_given_once() -> None:
+    assert "not both" in refusal("tcp://10.0.0.1:1?token=geheim&token_file=/etc/token")
+
+
+async def test_a_token_file_is_as_good_as_the_token(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    file.write_text(" geheim-4711\r\n")
+    heard = asyncio.get_running_loop().create_future()
+
+    async def hear(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        heard.set_result(await reader.readline())
+        writer.close()
+
+    server = await asyncio.start_server(hear, "127.0.0.1", 0)
+    async with server:
+        port = server.sockets[0].getsockname()[1]
+        transport = await open_transport(f"tcp://127.0.0.1:{port}?token_file={file}", arm="magician")
+        assert await heard == b"TOKEN geheim-4711\n"
+        await transport.aclose()

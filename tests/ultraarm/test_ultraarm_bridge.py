@@ -273,7 +273,7 @@ async def test_the_answers_of_one_client_come_in_its_order_refusals_and_stops_in
 
 async def test_bytes_may_be_cut_anywhere_and_noise_between_lines_counts_for_nothing() -> None:
     async with bridged() as rig, plain(rig.bridge.url) as client:
-        for byte in b"\xff\x00m12\r\n\rG92 x200 \r\nM114\r":
+        for byte in b"m12\xff\x00\r\n\rG92 x200 \r\nM114\r":
             await client.send(bytes([byte]))
 
         assert "ANGLES[" in await client.line()
@@ -481,8 +481,19 @@ def test_what_is_not_wholly_understood_is_a_write(line: bytes, kind: Kind) -> No
     assert BRIDGED.kind(Line(line + b"\r")) is kind
 
 
-@pytest.mark.parametrize("line", [b"%", b"M114 G28", b"N1 G28 M24"])
-def test_lines_of_several_commands_are_refused(line: bytes) -> None:
+@pytest.mark.parametrize(
+    "line", [b"M31", b"m031", b"M31.0", b"M31.", b"M+31", b"M 31", b"N5 M31", b"M31X", b"M+031.00 S1"]
+)
+def test_however_a_command_is_written_it_is_denied(line: bytes) -> None:
+    request = Line(line + b"\r")
+    assert BRIDGED.subject(request) in BRIDGED.denials["calibration"]
+    assert BRIDGED.kind(request) is Kind.WRITE
+
+
+@pytest.mark.parametrize(
+    "line", [b"%", b"M114 G28", b"N1 G28 M24", b"M31.9", b"M-31", b"M31 M31", b"M", b"X200", b"(x)M31", b"M31;x"]
+)
+def test_what_is_not_one_command_with_a_whole_number_is_refused(line: bytes) -> None:
     with pytest.raises(ProtocolError):
         BRIDGED.check(Line(line + b"\r"))
 
@@ -521,11 +532,21 @@ def test_a_watch_knows_what_moves_and_what_burns() -> None:
     assert not watch.moving(rest)
     watch.sent(Line(b"M21 P200\r"))
     assert watch.moving(rest)
-    watch.sent(Line(b"M21 P0\r"))
+    end(watch, b"M21 P0\r")
+    assert not watch.moving(rest)
     watch.sent(Line(b"M3\r"))
     assert watch.moving(rest)
-    watch.sent(Line(b"M5\r"))
+    end(watch, b"M5\r")
+    assert watch.moving(busy), "it may not have come to that yet"
     assert not watch.moving(rest)
+    watch.sent(Line(b"M15\r"))
+    assert watch.moving(rest), "the stop may have thrown M5 away"
+
+
+def end(watch: UltraArmWatch, line: bytes) -> None:
+    """Something is switched off, which is acknowledged."""
+    watch.sent(Line(line))
+    watch.answered(Line(line), Line(b"ok\r\n"))
 
 
 @pytest.mark.parametrize("cut", range(1, 12))

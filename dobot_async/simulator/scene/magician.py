@@ -21,11 +21,17 @@ class MagicianInScene:
 
     def __init__(self, arm: SimulatedMagician) -> None:
         self.arm = arm
+        self._colors: dict[c.ColorPort, tuple[c.AccessoryVersion, c.Color]] = {}
 
     @property
     def device(self) -> Device:
         """Its device."""
         return self.arm.device
+
+    @property
+    def due(self) -> float:
+        """When a command ends, or the air has followed one."""
+        return min(self.arm.device.due, self.arm.state.due)
 
     @property
     def moving(self) -> bool:
@@ -80,8 +86,8 @@ class MagicianInScene:
             self.arm.set_input(sensor.pin, int(seen))
 
     def sees_color(self, sensor: ColorSpot, flags: tuple[int, int, int]) -> None:
-        """At the socket that is switched on."""
-        register = self.arm.state.get(c.SET_COLOR_SENSOR)
-        if register.port is sensor.port:
-            self.arm.color_version = sensor.version
-            self.arm.color = c.Color(*flags)
+        """At its socket; the arm tells of the one that is switched on, which may have no sensor."""
+        self._colors[sensor.port] = sensor.version, c.Color(*flags)
+        switched = self.arm.state.get(c.SET_COLOR_SENSOR)
+        nothing = switched.version, c.Color(0, 0, 0)
+        self.arm.color_version, self.arm.color = self._colors.get(switched.port, nothing)

@@ -31,6 +31,11 @@ class MyCobotInScene:
         return self.arm.device
 
     @property
+    def due(self) -> float:
+        """When a command ends; its gripper moves meanwhile."""
+        return self.arm.device.due
+
+    @property
     def moving(self) -> bool:
         """Whether it moves, or its gripper does."""
         return self.arm.moving or self.arm.gripper.moving

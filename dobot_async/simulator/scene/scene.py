@@ -222,7 +222,7 @@ class Scene:
             if any(seat.changed for seat in self._seats):
                 self._look()
 
-            event = min((seat.arm.device.due for seat in self._seats), default=math.inf)
+            event = min((seat.arm.due for seat in self._seats), default=math.inf)
             step = next_step(self._time) if self._stirs() else math.inf
             self._stirred = self._stirred or step < math.inf
             time = min(until, max(self._time, min(event, step)))

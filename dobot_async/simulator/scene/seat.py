@@ -51,6 +51,10 @@ class SceneArm(Protocol):
         """Its device."""
 
     @property
+    def due(self) -> float:
+        """When the next thing happens by itself: a command ends, or a tool follows one; infinity if nothing does."""
+
+    @property
     def moving(self) -> bool:
         """Whether anything of it moves, its gripper included."""
 
@@ -124,7 +128,7 @@ class Seat:
             return self._gone
 
         mount = Placement(self.mount.x, self.mount.y, self.mount.z, self.mount.yaw)
-        if self.arm.rail:
+        if self.mount.rail_yaw is not None:
             along = Placement(yaw=self.mount.rail_yaw).then(Placement(self.arm.rail))
             mount = mount.then(along._replace(yaw=0.0))
 

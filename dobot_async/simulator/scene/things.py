@@ -234,7 +234,8 @@ class Mount:
         yaw: How far the arm is turned to the left about the vertical.
         tool: What it works with.
         name: What belts and sensors that are plugged into it say, and events.
-        rail_yaw: The direction of its rail, seen from the arm: 90 is to its left.
+        rail_yaw: Of an arm on a rail, the direction of the rail, seen from the arm: 90 is to its left. The mount is
+            where the arm stands at 0 mm. None: it stands on no rail, and stays where it is, whatever its program says.
     """
 
     x: float = 0.0
@@ -243,7 +244,7 @@ class Mount:
     yaw: float = 0.0
     tool: Tool = field(default_factory=CupTool)
     name: str = ""
-    rail_yaw: float = 90.0
+    rail_yaw: float | None = None
 
     def __post_init__(self) -> None:
         check(self)
@@ -255,7 +256,8 @@ LENGTHS = ("x", "y", "z", "yaw", "rail_yaw", "length", "offset", "opening", "tou
 def check(thing: Any) -> None:
     """Raises ValueError unless all places are finite, and all sizes above 0."""
     for name in LENGTHS:
-        if not math.isfinite(getattr(thing, name, 0.0)):
+        number = getattr(thing, name, None)
+        if number is not None and not math.isfinite(number):
             raise ValueError(f"{name} of {thing} is not finite")
 
     for name in ("at", "to"):

@@ -28,9 +28,14 @@ class UltraArmInScene:
         return self.arm.device
 
     @property
+    def due(self) -> float:
+        """When a command ends; its gripper moves meanwhile."""
+        return self.arm.device.due
+
+    @property
     def moving(self) -> bool:
-        """Whether it moves."""
-        return self.arm.device.moving
+        """Whether it moves, or its gripper does."""
+        return self.arm.device.moving or self.arm.gripper_moving
 
     @property
     def sucks(self) -> bool:
@@ -40,8 +45,7 @@ class UltraArmInScene:
     @property
     def opening(self) -> float:
         """Of its gripper; a released one is open."""
-        opening = self.arm.registers.gripper
-        return 1.0 if opening is None else opening / 100
+        return 1.0 if self.arm.registers.gripper is None else self.arm.gripper / 100
 
     def tip(self, tool: Tool) -> Placement:
         """Below the end of the arm; the fourth joint turns it."""
