@@ -36,6 +36,8 @@ COMMANDS = {
         "dobot_async.cli.discover:discover_arms",
         "Search for arms on USB, in the Wi-Fi, over BLE and on Zenoh.",
     ),
+    "draw": ("dobot_async.cli.drawing:draw_file", "Draw a file with a pen: SVG, DXF, G-code, a picture."),
+    "engrave": ("dobot_async.cli.drawing:engrave_file", "Engrave a picture or a drawing with the laser."),
     "gcode": ("dobot_async.cli.gcode:gcode", "Run a G-code file on an ultraarm."),
     "home": ("dobot_async.cli.commands:home", "Drive home, which calibrates the arm."),
     "info": ("dobot_async.cli.commands:info", "Tell who the arm is."),
@@ -48,6 +50,7 @@ COMMANDS = {
     "simulate": ("dobot_async.cli.simulate:simulate", "Simulate an arm until Ctrl-C."),
     "stop": ("dobot_async.cli.commands:stop", "Stop the arm now, and empty its queue."),
     "suction": ("dobot_async.cli.commands:suction", "Switch the suction cup."),
+    "write": ("dobot_async.cli.drawing:write_line", "Write a text with a pen."),
     "wifi": ("dobot_async.cli.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
 }
 """Where each command is, and what the help says of it."""

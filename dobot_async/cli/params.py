@@ -14,7 +14,17 @@ import click
 from dobot_async.cli.failures import WrongFile
 from dobot_async.program.text import LARGEST, read_text
 
-__all__ = ["ABOVE_ZERO", "DURATION", "PROGRAM", "Place", "Text", "standard_input"]
+__all__ = [
+    "ABOVE_ZERO",
+    "DURATION",
+    "FINITE",
+    "NOT_BELOW_ZERO",
+    "PERCENT",
+    "PROGRAM",
+    "Place",
+    "Text",
+    "standard_input",
+]
 
 PORTS = range(1 << 16)
 MOST_SECONDS = 86400.0  # a day
@@ -54,6 +64,16 @@ class FiniteRange(click.FloatRange):
             self.fail(f"{value!r} is no finite number", param, ctx)
 
         return number
+
+
+class FiniteNumber(click.ParamType[float]):
+    """Numbers, below 0 as well."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Reads a number."""
+        return EVERY.convert(value, param, ctx)
 
 
 class Text(NamedTuple):
@@ -96,5 +116,9 @@ def standard_input() -> bytes:
 
 
 PROGRAM = TextFile()
+EVERY = FiniteRange()
 ABOVE_ZERO = FiniteRange(0, min_open=True)
+FINITE = FiniteNumber()
+NOT_BELOW_ZERO = FiniteRange(0)
+PERCENT = FiniteRange(0, 100, min_open=True)
 DURATION = FiniteRange(0, max=MOST_SECONDS)

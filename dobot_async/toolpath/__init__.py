@@ -8,7 +8,7 @@
 Readers of files need the extra `draw`, and say so where it is missing; `import dobot_async` imports nothing of this.
 """
 
-from dobot_async.toolpath.drawing import Drawing, Progress, draw, engrave
+from dobot_async.toolpath.drawing import Drawing, draw, engrave
 from dobot_async.toolpath.dxf import read_dxf
 from dobot_async.toolpath.errors import MissingLibrary, ToolpathFileError, UnreachableStroke
 from dobot_async.toolpath.estimate import Estimate, estimate
@@ -16,7 +16,8 @@ from dobot_async.toolpath.gcode import read_gcode
 from dobot_async.toolpath.picture import read_picture
 from dobot_async.toolpath.plane import OnPlane, WorkPlane
 from dobot_async.toolpath.preview import Preview, preview
-from dobot_async.toolpath.reach import reach_of, reachable
+from dobot_async.toolpath.progress import Progress
+from dobot_async.toolpath.reach import check_toolpath, reach_of, reachable
 from dobot_async.toolpath.stroke import Bounds, Matrix, Point, Stroke
 from dobot_async.toolpath.svg import read_svg
 from dobot_async.toolpath.text import fonts, write_text
@@ -38,6 +39,7 @@ __all__ = [
     "ToolpathFileError",
     "UnreachableStroke",
     "WorkPlane",
+    "check_toolpath",
     "draw",
     "engrave",
     "estimate",

@@ -6,30 +6,29 @@
 1. All of it is checked first: a place out of reach is an error before anything moves.
 2. Commands follow each other without a WAIT and without another one between them, so that the arm's look-ahead sees a
    path and no points. Another program that uses the same queue meanwhile comes in between batches.
-3. A stroke is done when the arm has done it. What fails tells the stroke with which to go on.
+3. A stroke is done when the arm has done it. What fails tells where to go on: a pen at the start of the stroke, a
+   laser where it was stopped, for what is burnt twice is darker.
 4. The drawing belongs to who awaits it: on every way out but the good end the arm is stopped and its laser is off.
 """
 
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any, SupportsFloat
 
 from dobot_async._core.queue.epoch import Epoch
-from dobot_async._core.queue.motion import Motion
-from dobot_async._core.util.arguments import check_duration
 from dobot_async._core.util.tasks import cancel_and_join
-from dobot_async.errors import DobotError, MotionStopped, another
+from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, another
 from dobot_async.magician.arm import Magician
 from dobot_async.mycobot.arm import MyCobot
-from dobot_async.toolpath.moves import Move, Tool, approach, check_moves
+from dobot_async.toolpath.moves import Move, Tool, approach, check_moves, from_point
 from dobot_async.toolpath.plane import Place, WorkPlane
+from dobot_async.toolpath.position import Position, Sent, along, stand_of
 from dobot_async.toolpath.programs import Instruction, Pace, check_tool, program_for
+from dobot_async.toolpath.progress import Progress, ProgressMeter
 from dobot_async.toolpath.reach import reach_of
 from dobot_async.toolpath.schedule import (
     RATE,
@@ -38,37 +37,18 @@ from dobot_async.toolpath.schedule import (
     batches,
     guess,
     planned,
-    whole,
+    position_in,
+    simplified,
     whole_percent,
 )
 from dobot_async.toolpath.toolpath import Toolpath
 from dobot_async.ultraarm.arm import UltraArm
 
-__all__ = ["Drawing", "DrawingArm", "Progress", "draw", "engrave"]
+__all__ = ["Drawing", "DrawingArm", "draw", "engrave"]
 
-logger = logging.getLogger("dobot_async.toolpath")
 DrawingArm = Magician | UltraArm | MyCobot
 LOOK = 0.5  # seconds between two questions how far the arm is, while commands are sent: each takes the line for a while
-LEAST_KNOWN = 0.05  # of the time that was guessed, before how long it really takes is believed
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a drawing is.
-
-    Attributes:
-        strokes: How many are done, those before the one with which it began among them.
-        of: How many there are.
-        mm: How much was drawn, mm.
-        of_mm: How much there is to draw.
-        seconds_left: How long it will still take, by how long it has taken so far.
-    """
-
-    strokes: int
-    of: int
-    mm: float
-    of_mm: float
-    seconds_left: float
+LOCATING = 1.5  # seconds after the error, in which an arm has stopped and told where it stands, or is not waited for
 
 
 class Drawing:
@@ -86,9 +66,6 @@ class Drawing:
         rate: Commands per second that the line carries; where many short ways follow one another the speed of a
             Magician is made so low that the arm does not use up its queue. None does not look.
         progress: Called with a `Progress` when something was done.
-
-    Attributes:
-        next_stroke: The first stroke that is not known to be done: with it `run` goes on.
 
     Raises:
         UnreachableStroke: The arm cannot go there; it names stroke, point and reason.
@@ -114,42 +91,45 @@ class Drawing:
         if speed is not None and isinstance(arm, MyCobot):
             raise ValueError("a myCobot knows no speed in mm/s: give percent= (1 to 100) instead")
 
-        if not toolpath.strokes:
-            raise ValueError("there is nothing to draw: the toolpath has no strokes")
-
         self._arm = arm
         self._plane = plane
         self._tool = tool
         self._reach = reach_of(arm)
         self._pace = Pace(above_zero(acceleration, "acceleration"), whole_percent(percent))
-        path = toolpath.simplify(check_duration(tolerance, "tolerance"))
+        path = simplified(toolpath, tolerance)
         self._strokes = planned(path, plane, tool, speed, rate if isinstance(arm, Magician) else None)
-        self._lengths = [stroke.length for stroke in path]
-        self._guess = [guess(moves) for moves in self._strokes]
+        lengths, guesses = [stroke.length for stroke in path], [guess(moves) for moves in self._strokes]
+        self._meter = ProgressMeter(lengths, guesses, progress)
         check_moves((move for moves in self._strokes for move in moves), self._reach)
-        self._progress = progress
         self._running: asyncio.Task[Any] | None = None
         self._stopped = False
         self._epoch = Epoch()
-        self._began = 0.0
-        self._taken = (0.0, 0.0)  # seconds that what is done has taken, and was guessed to take
-        self.next_stroke = 0
+        self._position = Position(0)
+
+    @property
+    def next_stroke(self) -> int:
+        """The first stroke that is not known to be done: with it `run` goes on."""
+        return self._position.stroke
+
+    @property
+    def next_point(self) -> float:
+        """How far a laser was in it, in points: 7.25 is a quarter of the way from point 7 to point 8. 0 for a pen."""
+        return self._position.point
 
     @property
     def progress(self) -> Progress:
         """How far it is."""
-        done, total, guessed = self.next_stroke, sum(self._lengths), sum(self._guess[self.next_stroke :])
-        taken, of = self._taken
-        slower = taken / of if of > LEAST_KNOWN * sum(self._guess) else 1.0
-        return Progress(done, len(self._strokes), sum(self._lengths[:done]), total, guessed * slower)
+        return self._meter.progress(self.next_stroke)
 
-    async def run(self, *, first: int | None = None) -> None:
-        """Draw, from `next_stroke` on; return when the arm has done all of it.
+    async def run(self, *, first: int | None = None, point: SupportsFloat = 0.0) -> None:
+        """Draw, from `next_stroke` and `next_point` on; return when the arm has done all of it.
 
-        A stroke in which it was interrupted is drawn again from its start. Before the first stroke the tool is lifted.
+        A stroke in which it was interrupted is drawn again from its start by a pen; a laser goes on where it was
+        stopped. Before the first stroke the tool is lifted.
 
         Args:
             first: The stroke, from 0, to begin with.
+            point: Of a laser: how far in this stroke, as `next_point` of the same toolpath with the same tolerance.
 
         Raises:
             UnreachableStroke: The way from where the arm is to the first stroke is out of reach; nothing was sent.
@@ -160,18 +140,18 @@ class Drawing:
             raise RuntimeError("it is being drawn already")
 
         if first is not None:
-            self.next_stroke = whole(first, len(self._strokes))
+            self._position = position_in(self._strokes, first, point, self._tool)
 
         if self.next_stroke == len(self._strokes):
             return
 
-        self._running, self._stopped, self._taken = asyncio.current_task(), False, (0.0, 0.0)
+        self._running, self._stopped = asyncio.current_task(), False
         self._epoch = self._arm.queue.epoch  # which a stop by anybody ends
         try:
             here, program = await program_for(self._arm, self._tool, self._pace)
             moves = self._moves(here)
             check_moves(moves, self._reach, here)
-            await self._draw(list(program.instructions(moves)))
+            await self._draw(list(program.instructions(moves)), here)
         finally:
             self._running = None
 
@@ -180,53 +160,79 @@ class Drawing:
         self._stopped = True
         await self._arm.stop()
 
+    def how_to_go_on(self) -> str:
+        """Return the arguments with which the rest is drawn, for the note on an error."""
+        return f"first={self.next_stroke}" + (f", point={self.next_point}" if self.next_point else "")
+
     def _moves(self, here: Place) -> list[Move]:
         """All moves that are still to be made."""
-        moves = [move for some in self._strokes[self.next_stroke :] for move in some]
+        strokes = self._strokes[self.next_stroke :]
+        moves = from_point(strokes[0], self.next_point) + [move for some in strokes[1:] for move in some]
         return approach(here, moves, self._plane) + moves
 
-    async def _draw(self, instructions: Sequence[Instruction]) -> None:
+    async def _draw(self, instructions: Sequence[Instruction], here: Place) -> None:
         """Put all commands, and wait until they are done; on another way out, stop."""
-        pending: deque[tuple[Motion, int]] = deque()
-        self._began = asyncio.get_running_loop().time()
+        pending: deque[Sent] = deque()
+        self._meter.begin(asyncio.get_running_loop().time())
         watcher = asyncio.create_task(self._watch(pending), name="dobot_async progress of a drawing")
         try:
-            await self._put(instructions, pending)
+            await self._put(instructions, here, pending)
             while pending:
-                await pending[0][0]
+                await next(each.motion for each in pending if each.ends)
                 self._count(pending)
         except BaseException as error:
-            cleanup = self._arm.link.cleanup
-            failure = await cleanup.finish(cleanup.start(self._arm.leave(), "the end of a drawing"))
-            self._count(pending)
-            error.add_note(
-                f"stroke {self.next_stroke} of {len(self._strokes)} (from 0) is not known to be done; "
-                f"first={self.next_stroke} goes on with it"
-            )
-            if failure:
-                error.add_note(f"it is not known whether the arm stands, and its laser is off: {failure}")
+            try:
+                await self._end(error, pending)
+            except asyncio.CancelledError as again:  # of who was cancelled once more meanwhile
+                again.add_note(self._note())
+                raise
 
             raise
         finally:
             await cancel_and_join(watcher)
 
-    async def _put(self, instructions: Sequence[Instruction], pending: deque[tuple[Motion, int]]) -> None:
-        """Put commands in batches; note the last one of each stroke."""
-        motions: list[Motion] = []
+    async def _end(self, error: BaseException, pending: deque[Sent]) -> None:
+        """Stop the arm, find out how far it was, and tell it with the error."""
+        cleanup, deadline = self._arm.link.cleanup, asyncio.get_running_loop().time() + LOCATING
+        failure = await cleanup.finish(cleanup.start(self._arm.leave(), "the end of a drawing"))
+        self._count(pending)
+        # After an alarm nothing tells which of the commands failed that the arm has ticked off.
+        if pending and not failure and not isinstance(error, ArmAlarm):
+            await cleanup.finish(
+                cleanup.start(self._locate(pending, deadline), "the search where a drawing was stopped")
+            )
+
+        error.add_note(self._note())
+        if failure:
+            error.add_note(f"it is not known whether the arm stands, and its laser is off: {failure}")
+
+    def _note(self) -> str:
+        """What is said of the rest."""
+        if self.next_stroke == len(self._strokes):
+            return "all strokes are done" + ("; the pen may still be down" if self._tool == "pen" else "")
+
+        which = f"stroke {self.next_stroke} (of {len(self._strokes)}, from 0)"
+        return f"{which} is not known to be done; {self.how_to_go_on()} draws the rest"
+
+    async def _locate(self, pending: deque[Sent], deadline: float) -> None:
+        """Find out how far a stopped arm was, if the way out has left time for it."""
+        with suppress(DobotError, TimeoutError):
+            async with asyncio.timeout_at(deadline):
+                if stand := await stand_of(self._arm):
+                    self._reached(along(pending, stand, self._position))
+
+    async def _put(self, instructions: Sequence[Instruction], here: Place, pending: deque[Sent]) -> None:
+        """Put commands in batches."""
+        place = here
         for some in batches(instructions):
             self._check_stop()
             async with self._arm.queue.batch() as batch:
-                motions = [batch.put(each.row, each.value) for each, _ in some]
+                for each, ends in some:  # noted before they are sent: whoever interrupts that asks what became of them
+                    pending.append(Sent(batch.put(each.row, each.value), each.move, place, ends))
+                    place = each.move.place if each.move else place
 
-            pending.extend(
-                (motion, each.move.stroke)
-                for motion, (each, ends) in zip(motions, some, strict=True)
-                if ends and each.move
-            )
             if failure := self._count(pending):
                 raise another(failure)
-
-        pending.append((motions[-1], len(self._strokes) - 1))
 
     def _check_stop(self) -> None:
         """Raise MotionStopped if a stop came since `run` began: nothing is awaited between this and the next batch."""
@@ -235,7 +241,7 @@ class Drawing:
 
         self._epoch.check()
 
-    async def _watch(self, pending: deque[tuple[Motion, int]]) -> None:
+    async def _watch(self, pending: deque[Sent]) -> None:
         """Ask now and then how far the arm is: no more often, for each question takes the line for a while."""
         while True:
             await asyncio.sleep(LOOK)
@@ -244,27 +250,22 @@ class Drawing:
 
             self._count(pending)
 
-    def _count(self, pending: deque[tuple[Motion, int]]) -> DobotError | None:
-        """Count the strokes that are done; return what the first one that is not has failed with."""
-        before, failure = self.next_stroke, None
-        while pending and pending[0][0].ended and not failure:
-            motion, stroke = pending[0]
-            failure = motion.exception()
+    def _count(self, pending: deque[Sent]) -> DobotError | None:
+        """Count what is done; return what the first command that is not has failed with."""
+        position, failure = self._position, None
+        while pending and pending[0].motion.ended and not failure:
+            failure = pending[0].motion.exception()
             if not failure:
-                pending.popleft()
-                self.next_stroke = max(self.next_stroke, stroke + 1)
+                position = pending.popleft().passed(position)
 
-        if self.next_stroke > before:
-            now = asyncio.get_running_loop().time()
-            guessed = self._taken[1] + sum(self._guess[before : self.next_stroke])
-            self._taken = now - self._began, guessed
-            if self._progress:
-                try:
-                    self._progress(self.progress)
-                except Exception:
-                    logger.exception("progress= of a drawing failed")
-
+        self._reached(position)
         return failure
+
+    def _reached(self, position: Position) -> None:
+        """Note how far it is, and tell it if strokes were done."""
+        before = self.next_stroke
+        self._position = position if self._tool == "laser" else Position(position.stroke)
+        self._meter.reached(before, self.next_stroke, asyncio.get_running_loop().time())
 
 
 async def draw(arm: DrawingArm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:
@@ -280,10 +281,18 @@ async def draw(arm: DrawingArm, toolpath: Toolpath, plane: WorkPlane, *, first: 
     await Drawing(arm, toolpath, plane, tool="pen", **options).run(first=first)
 
 
-async def engrave(arm: DrawingArm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:
+async def engrave(
+    arm: DrawingArm,
+    toolpath: Toolpath,
+    plane: WorkPlane,
+    *,
+    first: int = 0,
+    point: SupportsFloat = 0.0,
+    **options: Any,
+) -> None:
     """Engrave a toolpath with a laser, which is off on every way out; see `draw`.
 
     The plane is that of the focus: the laser is moved in it, and lifted on the way to the first stroke alone. A dot is
-    a line of 0.1 mm.
+    a line of 0.1 mm. With `first` and `point` it goes on where it was stopped.
     """
-    await Drawing(arm, toolpath, plane, tool="laser", **options).run(first=first)
+    await Drawing(arm, toolpath, plane, tool="laser", **options).run(first=first, point=point)

@@ -17,7 +17,7 @@ from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.stroke import Stroke
 from dobot_async.toolpath.toolpath import Toolpath
 
-__all__ = ["Kind", "Move", "Reach", "Tool", "approach", "check_moves", "fastest", "moves_of"]
+__all__ = ["SAME", "Kind", "Move", "Reach", "Tool", "approach", "check_moves", "fastest", "from_point", "moves_of"]
 
 Tool = Literal["pen", "laser"]
 Reach = Callable[[Place], None]
@@ -104,6 +104,15 @@ def approach(here: Place, moves: Sequence[Move], plane: WorkPlane) -> list[Move]
         found.append(replace(first, kind=Kind.LOWER))
 
     return found
+
+
+def from_point(moves: Sequence[Move], point: float) -> list[Move]:
+    """Return the moves of a laser's stroke from a place in it on, which is told in points."""
+    behind = int(point)
+    start, end = moves[behind].place, moves[behind + 1].place
+    share = point - behind
+    place = tuple(a + share * (b - a) for a, b in zip(start, end, strict=True))
+    return [replace(moves[0], place=place), *moves[behind + 1 :]] if point else list(moves)  # type: ignore[arg-type]
 
 
 def check_moves(moves: Iterable[Move], reach: Reach, here: Place | None = None) -> None:

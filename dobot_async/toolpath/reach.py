@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, SupportsFloat
 
 from dobot_async.magician.arm import Magician
 from dobot_async.magician.kinematics import BEYOND_LIMIT, Kinematics, Unreachable
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.models import CobotModel
-from dobot_async.toolpath.moves import Reach
+from dobot_async.toolpath.moves import Reach, Tool, check_moves
 from dobot_async.toolpath.plane import Place, WorkPlane
+from dobot_async.toolpath.schedule import TOLERANCE, planned, position_in, simplified
+from dobot_async.toolpath.toolpath import Toolpath
 from dobot_async.ultraarm.arm import UltraArm
 from dobot_async.ultraarm.params import CoordsMove, UltraArmLimits
 
-__all__ = ["reach_of", "reachable"]
+__all__ = ["check_toolpath", "reach_of", "reachable"]
 
 
 def of_kinematics(kinematics: Kinematics) -> Reach:
@@ -91,3 +93,33 @@ def reachable(arm: object, plane: WorkPlane) -> Callable[[float, float], bool]:
         return True
 
     return inside
+
+
+def check_toolpath(
+    arm: object,
+    toolpath: Toolpath,
+    plane: WorkPlane,
+    *,
+    tool: Tool = "pen",
+    tolerance: SupportsFloat = TOLERANCE,
+    first: int = 0,
+    point: SupportsFloat = 0.0,
+) -> None:
+    """Check all strokes, the ways between them and the lifts as `draw` does, without an arm.
+
+    Args:
+        arm: As for `reach_of`.
+        toolpath: What is to be drawn.
+        plane: Where the paper lies.
+        tool: "pen" or "laser".
+        tolerance: As for `Drawing`, mm.
+        first: As for `Drawing.run`.
+        point: As for `Drawing.run`.
+
+    Raises:
+        UnreachableStroke: The arm cannot go there; it names stroke, point and reason.
+        ValueError: There is nothing to draw, or no such stroke or point.
+    """
+    strokes = planned(simplified(toolpath, tolerance), plane, tool, None, None)
+    check_moves((move for moves in strokes for move in moves), reach_of(arm))
+    position_in(strokes, first, point, tool)

@@ -7,13 +7,24 @@ from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 from typing import Any, SupportsFloat
 
-from dobot_async._core.util.arguments import to_float
+from dobot_async._core.util.arguments import check_duration, to_float
 from dobot_async.toolpath.moves import Kind, Move, Tool, fastest, moves_of
 from dobot_async.toolpath.plane import WorkPlane
+from dobot_async.toolpath.position import Position
 from dobot_async.toolpath.programs import Instruction
 from dobot_async.toolpath.toolpath import Toolpath
 
-__all__ = ["RATE", "TOLERANCE", "above_zero", "batches", "guess", "planned", "whole", "whole_percent"]
+__all__ = [
+    "RATE",
+    "TOLERANCE",
+    "above_zero",
+    "batches",
+    "guess",
+    "planned",
+    "position_in",
+    "simplified",
+    "whole_percent",
+]
 
 SPEEDS: dict[Tool, float] = {"pen": 50.0, "laser": 20.0}
 TOLERANCE = 0.05  # mm; a third of what an arm repeats
@@ -21,6 +32,14 @@ BATCH = 24  # commands that are put together: fewer than an arm's queue holds
 RATE = 120.0  # commands per second that a line of 115200 baud carries with room to spare
 DEPTH = 24  # commands that lie ready in the arm while more come
 PER_MOVE = 0.15  # seconds that a move of the pen takes beside its way, for the first guess of the time that is left
+
+
+def simplified(toolpath: Toolpath, tolerance: SupportsFloat) -> Toolpath:
+    """The toolpath as it is drawn; raises ValueError for one without strokes."""
+    if not toolpath.strokes:
+        raise ValueError("there is nothing to draw: the toolpath has no strokes")
+
+    return toolpath.simplify(check_duration(tolerance, "tolerance"))
 
 
 def planned(
@@ -45,7 +64,7 @@ def batches(instructions: Sequence[Instruction]) -> Iterator[list[tuple[Instruct
         if each.move and each.move.kind in {Kind.DRAW, Kind.LIFT}:
             last[each.move.stroke] = number
 
-    for number in last.values():
+    for number in (*last.values(), len(instructions) - 1):
         ends[number] = True
 
     marked = iter(list(zip(instructions, ends, strict=True)))
@@ -77,12 +96,22 @@ def whole_percent(value: Any) -> int:
     return int(value)
 
 
-def whole(value: Any, count: int) -> int:
-    """The number of a stroke."""
-    if not hasattr(value, "__index__"):
-        raise TypeError(f"first must be the number of a stroke, not {value!r}")
+def position_in(strokes: Sequence[Sequence[Move]], stroke: Any, point: SupportsFloat, tool: Tool) -> Position:
+    """The place where to begin, checked."""
+    if not hasattr(stroke, "__index__"):
+        raise TypeError(f"first must be the number of a stroke, not {stroke!r}")
 
-    if not 0 <= value < count:
-        raise ValueError(f"first must be in 0 to {count - 1}, for there are {count} strokes, not {value!r}")
+    if not 0 <= stroke < len(strokes):
+        raise ValueError(
+            f"first must be in 0 to {len(strokes) - 1}, for there are {len(strokes)} strokes, not {stroke!r}"
+        )
 
-    return int(value)
+    found = to_float(point, "point")
+    if found and tool != "laser":
+        raise ValueError("point is for lasers alone: a pen draws a stroke from its start")
+
+    last = len(strokes[stroke]) - 1
+    if not 0 <= found <= last or (found == last and found):
+        raise ValueError(f"point must be 0 or above and below {last}, the last point of stroke {stroke}, not {point!r}")
+
+    return Position(stroke.__index__(), found)

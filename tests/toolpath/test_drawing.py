@@ -290,7 +290,7 @@ def test_on_every_way_out_the_arm_stands_its_laser_is_off_and_it_goes_on_from_th
                 await task
 
             if how != "timeout":
-                assert f"first={drawing.next_stroke} goes on with it" in "".join(caught.value.__notes__)
+                assert f"first={drawing.next_stroke} draws the rest" in "".join(caught.value.__notes__)
 
             assert drawing.next_stroke == 1
             assert not sim.arm.device.moving
