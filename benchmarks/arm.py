@@ -209,6 +209,7 @@ class Clock:
         self.speed = speed
 
     def __call__(self) -> float:
+        """Simulated seconds."""
         return time.monotonic() * self.speed
 
 
