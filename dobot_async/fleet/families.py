@@ -18,7 +18,7 @@ from typing import Any, Protocol, TypeVar, cast
 
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.hooks import Hooks
-from dobot_async.errors import ReplyTimeout
+from dobot_async.errors import MotionUnknown, ReplyTimeout
 from dobot_async.families import Each
 from dobot_async.fleet.frames import Place
 from dobot_async.fleet.magician_planner import MagicianPlanner
@@ -74,6 +74,19 @@ class FleetMagician(Magician):
         self._executor.on_unknown = Hooks()  # it told the queue that this one replaces
         self.queue: FleetMagicianQueue = FleetMagicianQueue(self._executor)
 
+    @property
+    def restarts(self) -> int:
+        """How often it was seen to have been switched off and on."""
+        return self._executor.status.restarts
+
+    async def check_restart(self) -> None:
+        """Raises MotionUnknown if an arm with nothing to do was switched off and on; it has failed then."""
+        try:
+            await self._executor.status.check_idle()
+        except MotionUnknown as error:
+            self.queue.give_up(error)
+            raise
+
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
         """Sends any row immediately; what ways depend on, once the fleet allows it; see `Magician.request`."""
         async with self.queue.changing(value) if isinstance(value, WAYS_DEPEND_ON) else nullcontext():
@@ -127,6 +140,11 @@ class FleetUltraArm(UltraArm):
         self._executor.on_unknown = Hooks()
         self.queue: FleetUltraArmQueue = FleetUltraArmQueue(self._executor, self.pump)
 
+    @property
+    def homed(self) -> bool:
+        """False once its motors were told to let go, until it was home; that it was switched off does not show."""
+        return self._runner.state.homed
+
     @asynccontextmanager
     async def jogging(self, direction: UltraArmJog | str, **options: Any) -> AsyncIterator[None]:
         """Jogs until the block ends, once the fleet allows it; see `UltraArm.jogging`."""
@@ -144,7 +162,6 @@ class Family:
         kind: Its class in a fleet.
         batch: Makes an empty batch for a queue.
         planner: Makes what knows its ways, and the heading of its rail.
-        recover: Makes it ready again after a failure.
         leftovers: Waits until it has done what an earlier program has left in its queue.
         stop: The command that stops it, is acknowledged, and may be sent twice; None if there is none.
         ask: A cheap question, for measuring how long an answer takes.
@@ -158,7 +175,6 @@ class Family:
     kind: type[Any]
     batch: Callable[[Any], Any]
     planner: Callable[[Any, float | None], Planner[Any]]
-    recover: Callable[[Any], Awaitable[None]]
     leftovers: Callable[[Any], Awaitable[None]]
     ask: Callable[[Any], Awaitable[object]]
     place: Callable[[Any], Awaitable[Place]]
@@ -202,14 +218,14 @@ async def coords_place(arm: HasCoords) -> Place:
     return Place(coords.x, coords.y, coords.z)
 
 
-def unplanned(arm: HasCoords, _: float | None) -> Unplanned:
-    """What knows no ways."""
-    return Unplanned(partial(coords_place, arm))
+def mycobot_planner(arm: FleetMyCobot, _: float | None) -> Unplanned:
+    """What knows no ways of an arm that always knows its place."""
+    return Unplanned(partial(coords_place, arm), lambda: False)
 
 
-async def cleared(arm: FleetMyCobot | FleetUltraArm) -> None:
-    """Empties the queue of an arm, and lets it run."""
-    await arm.queue.clear()
+def ultraarm_planner(arm: FleetUltraArm, _: float | None) -> Unplanned:
+    """What knows no ways of an arm that has to be homed."""
+    return Unplanned(partial(coords_place, arm), lambda: not arm.homed)
 
 
 async def magician_leftovers(arm: FleetMagician) -> None:
@@ -248,7 +264,6 @@ MAGICIAN = Family(
     kind=FleetMagician,
     batch=lambda arm: Batch(arm.queue),
     planner=MagicianPlanner,
-    recover=lambda arm: cast(Magician, arm).recover(),
     leftovers=magician_leftovers,
     ask=lambda arm: cast(Magician, arm).request(magician.GET_QUEUED_CMD_CURRENT_INDEX, None),
     place=magician_place,
@@ -261,8 +276,7 @@ MYCOBOT = Family(
     name="mycobot",
     kind=FleetMyCobot,
     batch=lambda arm: CobotBatch(arm.queue, arm.model),
-    planner=unplanned,
-    recover=cleared,
+    planner=mycobot_planner,
     leftovers=nothing_left,
     ask=lambda arm: cast(MyCobot, arm).request(mycobot.IS_POWER_ON, None),
     place=coords_place,
@@ -274,8 +288,7 @@ ULTRAARM = Family(
     name="ultraarm",
     kind=FleetUltraArm,
     batch=lambda arm: UltraArmBatch(arm.queue, arm.pump),
-    planner=unplanned,
-    recover=cleared,
+    planner=ultraarm_planner,
     leftovers=ultraarm_leftovers,
     ask=lambda arm: cast(UltraArm, arm).get_queue_size(),
     place=coords_place,

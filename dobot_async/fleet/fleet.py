@@ -236,7 +236,7 @@ class Fleet(Crew[A]):
         """
 
         async def recovered(seat: Seat) -> None:
-            await seat.family.recover(seat.arm)
+            await seat.arm.recover()
             await seat.locate()
 
         await self._stops_heard()

@@ -9,6 +9,8 @@
 3. It is read from the arm alone, when no step is left and the arm has heard its stop and rests.
 4. An arm without anything to do is looked at again before its next motion: it may have been switched off, or led by
    hand.
+5. An arm that was switched off and on does not know where it is: it may be anywhere in its reach, and so may each of its
+   ways lead, until it was homed.
 
 What is looked at is the tool's place; `clearance` is for what is around it.
 """
@@ -111,15 +113,19 @@ class Guard(Generic[S]):
         if moves:
             await self._be_sure()
 
-        stance, steps, changes = self._stance, [], False
+        planner, ahead = self._planner, list(self._steps)
+        stance, steps, changes = self._stance, list[Step](), False
         for motion in motions:
             value = motion.entry.value
-            plan = await self._planner.plan(value, stance) if motion.moves else self._planner.change(value, stance)
+            plan = await planner.plan(value, stance) if motion.moves else planner.change(value, stance)
             if plan is None:
                 steps.append(Step(motion))
                 continue
 
             if motion.moves:
+                if plan.outline != () and not any(planner.homes(each.motion.entry.value) for each in ahead + steps):
+                    self._check_homed()
+
                 self._limits.check(plan.outline, stance.tool if stance else None)
 
             changes = True
@@ -136,7 +142,7 @@ class Guard(Generic[S]):
 
         self._steps.extend(course.steps)
         for step in course.steps:
-            self._planner.begun(step.motion.entry.value)
+            step.homing = self._planner.begun(step.motion.entry.value)
 
         if course.moves:
             self._plans += 1
@@ -172,8 +178,12 @@ class Guard(Generic[S]):
     @asynccontextmanager
     async def roaming(self) -> AsyncIterator[None]:
         """While this is entered, the arm may go anywhere."""
+        if self.is_limited:
+            await self._be_sure()
+            self._check_homed()
+
         claim = await self.claim(self._anywhere(), None)
-        async with self._astray(claim):
+        async with self._loosened(claim):
             yield
 
     @asynccontextmanager
@@ -193,7 +203,7 @@ class Guard(Generic[S]):
 
         claim = await self.claim(self._zones_of(plan.region), None)
         self._planner.begun(value)
-        async with self._astray(claim):
+        async with self._loosened(claim):
             for step in self._steps:
                 if step.motion.moves:
                     step.zones, step.after = self._anywhere(), None
@@ -234,6 +244,9 @@ class Guard(Generic[S]):
             return
 
         self._steps.remove(step)
+        if step.homing is not None:
+            self._planner.homed(step.homing)
+
         if step.after is not None:
             self._standing, self._located = step.after, True
         elif step.motion.moves or step.zones:
@@ -271,9 +284,16 @@ class Guard(Generic[S]):
         self._mute = False
         if plans == self._plans and not self._loose:
             self._planner.settled(stance)
-            self._stance, self._located = stance, True
-            self._standing = self._zones_of(stance.region)
-            self._inside = stance.region.zones(self._zones, self._base, ROUNDING)
+            self._located = True
+            if self._planner.astray:
+                self._stance = None
+                self._standing |= self._anywhere()
+            else:
+                region, self._stance = stance.region, stance
+                self._standing = self._zones_of(region)
+                inside = region.zones(self._zones, self._base, ROUNDING)
+                self._inside = inside if region.known else frozenset()
+
             self._settle()
 
     async def watch_limits(self) -> str:
@@ -294,6 +314,9 @@ class Guard(Generic[S]):
         """Know where the arm stands, if it has nothing to do; it may have moved since it was looked at last."""
         if not self._located:
             self._forget()
+        elif self._planner.astray:
+            if self._stance:
+                self.unsure()
         elif not self._busy:
             plans, seen = self._plans, await self._planner.look()
             if plans == self._plans and self._stance and self._stance.near(seen):
@@ -305,8 +328,16 @@ class Guard(Generic[S]):
         if not (self._located or self._busy):
             await self.locate()
 
+    def _check_homed(self) -> None:
+        """Raise ValueError if the arm has limits, and does not know where it is."""
+        if self.is_limited and self._planner.astray:
+            raise ValueError(
+                f"{self._party.name}: it has lost its place, and cannot be kept within its limits until it was homed; "
+                "await home() first"
+            )
+
     @asynccontextmanager
-    async def _astray(self, claim: Claim | None) -> AsyncIterator[None]:
+    async def _loosened(self, claim: Claim | None) -> AsyncIterator[None]:
         """While this is entered, the arm may be wherever a claim lets it, and its stance is not known."""
         if claim:
             self._claims.append(claim)

@@ -313,6 +313,10 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
                 simulate(speed=SPEED, seed=random.randrange(1 << 30), faults=faults, homed=True)
             )
             sim.arm.guide_to(*AWAY)
+            if stand.rail is not None and random.random() < 0.8:
+                async with Magician.connect(sim.url) as arm:
+                    await arm.set_rail()
+
             keep = random.random() < 0.3 and not any(each.options["queue"] == "keep" for each in members.values())
             if keep:
                 await leave_something(sim, random)
