@@ -9,8 +9,8 @@
 3. It is read from the arm alone, when no step is left and the arm has heard its stop and rests.
 4. An arm without anything to do is looked at again before its next motion: it may have been switched off, or led by
    hand.
-5. An arm that was switched off and on does not know where it is: it may be anywhere in its reach, and so may each of its
-   ways lead, until it was homed.
+5. An arm that was switched off and on does not know where it is: it may be anywhere in its reach, and each of its ways
+   may lead anywhere there, until it was homed.
 
 What is looked at is the tool's place; `clearance` is for what is around it.
 """
@@ -288,6 +288,7 @@ class Guard(Generic[S]):
             if self._planner.astray:
                 self._stance = None
                 self._standing |= self._anywhere()
+                self._inside &= self.holds  # another one may be where it was looked at last
             else:
                 region, self._stance = stance.region, stance
                 self._standing = self._zones_of(region)

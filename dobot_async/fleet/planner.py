@@ -10,11 +10,12 @@ Lengths are mm, in the arm's coordinates where it stands at l = 0 of its rail.
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
-from dobot_async.fleet.frames import BaseFrame, Place
+from dobot_async.arms.base import Arm
+from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.zones import Zones
 
 __all__ = ["XYZ", "Discs", "Plan", "Planner", "Points", "Region", "Stance", "Unplanned"]
@@ -183,12 +184,12 @@ class Unplanned:
     """The planner of arms whose ways are not known: each may lead anywhere.
 
     Args:
-        place: Reads where the tool is.
+        arm: The arm.
         astray: Tells whether it is elsewhere than the arm says, for the arm has to be homed.
     """
 
-    def __init__(self, place: Callable[[], Awaitable[Place]], astray: Callable[[], bool]) -> None:
-        self._place = place
+    def __init__(self, arm: Arm, astray: Callable[[], bool]) -> None:
+        self._arm = arm
         self._astray = astray
 
     @property
@@ -202,8 +203,8 @@ class Unplanned:
 
     async def tool(self) -> XYZ:
         """Read where its tool is."""
-        x, y, z, _ = await self._place()
-        return x, y, z
+        pose = await self._arm.get_pose()
+        return pose.x, pose.y, pose.z
 
     async def plan(self, value: object, start: Somewhere | None) -> Plan[Somewhere]:  # noqa: ARG002 - no way is known
         """Return anywhere."""

@@ -6,13 +6,14 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager, nullcontext, suppress
-from typing import Any
+from typing import Any, cast
 
 import anyio
 
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
+from dobot_async.arms.base import Arm
 from dobot_async.contract import LinkState
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.fleet.claims import Claim, Party, Pause
@@ -21,7 +22,7 @@ from dobot_async.fleet.families import Family, family_of
 from dobot_async.fleet.guard import Guard
 from dobot_async.fleet.limits import Limits
 from dobot_async.fleet.member import Member
-from dobot_async.fleet.queue import FleetArm, FleetQueue
+from dobot_async.fleet.queue import FleetQueue
 from dobot_async.fleet.work import named
 from dobot_async.fleet.zones import Zones, here
 
@@ -42,7 +43,6 @@ class Seat:
         member: What it is.
         family: Its family.
         party: As what it holds zones.
-        arm: The arm, once it is connected.
         stopped: Why it may not move; None while all is well.
         commands: Whether it is connected to command it, not only to look on.
         stops_on_error: Whether it stops when the fleet is left by an error.
@@ -60,7 +60,7 @@ class Seat:
         self.member = member
         self.family: Family = family_of(member.kind)
         self.party = zones.arms[name]
-        self.arm: Any = None  # a FleetArm, and what its user takes it for
+        self._arm: Arm | None = None
         self.stopped: DobotError | None = None
         self.commands = self.stops_on_error = False
         self._zones = zones
@@ -76,14 +76,24 @@ class Seat:
         self._follower: asyncio.Task[None] | None = None
 
     @property
+    def connected(self) -> bool:
+        """Whether there is an arm yet."""
+        return self._arm is not None
+
+    @property
+    def arm(self) -> Arm:
+        """The arm, once it is connected."""
+        assert self._arm, f"{self.name} is not connected yet"
+        return self._arm
+
+    @property
     def queue(self) -> FleetQueue:
         """The arm's queue."""
-        arm: FleetArm = self.arm
-        return arm.queue
+        return cast(FleetQueue, self.arm.queue)  # each class of `Family.kind` has one
 
-    async def begin(self, arm: FleetArm, options: Mapping[str, Any]) -> None:
+    async def begin(self, arm: Arm, options: Mapping[str, Any]) -> None:
         """Takes an arm that was just connected, with these options."""
-        self.arm = arm
+        self._arm = arm
         member = self.member
         self.commands = options.get("control", True)
         self.stops_on_error = self.commands and options.get("on_error", "stop") == "stop"
@@ -94,7 +104,7 @@ class Seat:
             self._guard = guard = Guard(
                 self._steps,
                 self.family.planner(arm, member.rail),
-                arm.queue,
+                self.queue,
                 self._zones,
                 self.party,
                 base=member.base,
@@ -116,7 +126,7 @@ class Seat:
 
     def end(self) -> set[asyncio.Task[None]]:
         """Leaves the arm to itself; returns the tasks that end because of it."""
-        if self.arm:
+        if self.connected:
             self.queue.overseer = None
 
         for task in self._tasks:

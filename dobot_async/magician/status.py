@@ -136,7 +136,7 @@ class ArmStatus:
         raise self.restarted()
 
     async def check_idle(self) -> None:
-        """Raise MotionUnknown if an arm that had nothing to do was switched off and on; the first time, note its clock."""
+        """Raise MotionUnknown if an arm with nothing to do was switched off and on; note its clock the first time. V1.1."""
         if self._reading is None and not self._clockless:
             await self.remember()
         else:

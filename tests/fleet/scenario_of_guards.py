@@ -91,12 +91,18 @@ class Cell:
                 self.say(f"{asyncio.get_running_loop().time():8.3f} {name} {what.__name__}: done")
 
     async def ready(self, name: str, random: Random) -> None:
-        """Makes an arm ready again that has failed; now and then its tool is said anew."""
+        """Makes an arm ready again that has failed; now and then tool and rail are said anew, and it is homed."""
         with suppress(DobotError, ValueError, TimeoutError):
             async with asyncio.timeout(20):
                 await self.fleet[name].recover()
                 if random.random() < 0.5:
                     await self.fleet[name].set_end_effector(c.EndEffectorParams(*self.monitor.tool(name)))
+
+                if self.monitor.stands[name].rail is not None and random.random() < 0.5:
+                    await self.fleet[name].set_rail()
+
+                if random.random() < 0.5:
+                    await self.fleet[name].home()
 
     async def stop(self) -> None:
         """Stops all at some moment; nobody may move any more soon after that has returned, whatever programs do."""

@@ -11,9 +11,9 @@ import pytest
 from virtual import virtual
 
 from dobot_async import ArmAlarm, ConnectFailed, ConnectionLost, Fleet, Magician, MotionStopped, MyCobot, UltraArm
+from dobot_async.arms.base import Arm
 from dobot_async.fleet import BarrierBroken, Member
 from dobot_async.fleet.fleet import OnFailure
-from dobot_async.fleet.queue import FleetArm
 from dobot_async.fleet.seat import Seat
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate
@@ -293,7 +293,7 @@ async def test_a_lost_link_is_noticed_although_nobody_asks() -> None:
 async def test_a_link_that_is_lost_before_its_arm_has_its_seat_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     begin = Seat.begin
 
-    async def begin_too_late(seat: Seat, arm: FleetArm, options: Mapping[str, Any]) -> None:
+    async def begin_too_late(seat: Seat, arm: Arm, options: Mapping[str, Any]) -> None:
         if seat.name == "left":
             sims["left"].unplug()
             await anext(aiter(arm.link.state))
