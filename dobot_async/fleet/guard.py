@@ -227,6 +227,7 @@ class Guard(Generic[S]):
 
     async def catch_up(self) -> None:
         """Take note of all that is known to have ended: what it held may be what is asked for next."""
+        self._doubt()
         with suppress(DobotError):
             while self._steps and self._steps[0].motion.ended:
                 step = self._steps[0]
@@ -313,12 +314,10 @@ class Guard(Generic[S]):
 
     async def _be_sure(self) -> None:
         """Know where the arm stands, if it has nothing to do; it may have moved since it was looked at last."""
+        self._doubt()
         if not self._located:
             self._forget()
-        elif self._planner.astray:
-            if self._stance:
-                self.unsure()
-        elif not self._busy:
+        elif not (self._busy or self._planner.astray):
             plans, seen = self._plans, await self._planner.look()
             if plans == self._plans and self._stance and self._stance.near(seen):
                 self._planner.settled(seen)
@@ -328,6 +327,11 @@ class Guard(Generic[S]):
 
         if not (self._located or self._busy):
             await self.locate()
+
+    def _doubt(self) -> None:
+        """Trust no place that was read before the arm lost it."""
+        if self._planner.astray and self._stance:
+            self.unsure()
 
     def _check_homed(self) -> None:
         """Raise ValueError if the arm has limits, and does not know where it is."""

@@ -136,7 +136,7 @@ class ArmStatus:
         raise self.restarted()
 
     async def check_idle(self) -> None:
-        """Raise MotionUnknown if an arm with nothing to do was switched off and on; note its clock the first time. V1.1."""
+        """Raise MotionUnknown if an idle arm was switched off and on; note its clock the first time. V1.1."""
         if self._reading is None and not self._clockless:
             await self.remember()
         else:

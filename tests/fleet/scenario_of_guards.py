@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any, Literal
 
-from monitor import Monitor, Stand, Violation, Zone
+from monitor import Monitor, Stand, Violation, Zone, true_joints
 from virtual import run_virtual
 
 from dobot_async import ConnectionLost, DobotError, Fleet, Jog, Magician, PTPMode
@@ -109,10 +109,10 @@ class Cell:
         await asyncio.sleep(self.random.uniform(0, 5))
         await self.fleet.stop()
         await asyncio.sleep(GRACE)
-        stood = {name: sim.arm.device.joints for name, sim in self.sims.items()}
+        stood = {name: true_joints(sim) for name, sim in self.sims.items()}
         for _ in range(round(WATCHED / LOOK)):
             await asyncio.sleep(LOOK)
-            moved = [name for name, sim in self.sims.items() if sim.arm.device.joints != stood[name]]
+            moved = [name for name, sim in self.sims.items() if true_joints(sim) != stood[name]]
             if moved:
                 raise Violation(f"{moved} moved after the stop of the fleet")
 
