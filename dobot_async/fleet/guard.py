@@ -155,6 +155,7 @@ class Guard(Generic[S]):
             ZoneOccupied: Another holds one of them, and this arm does not wait, or in vain.
             ZoneDeadlock: Waiting for it would never end.
             ReplyTimeout: Waiting took too long.
+            MotionUnknown: The arm was switched off and on meanwhile.
         """
         program = here()
         self._zones.drive(self._party.name, program)
@@ -173,7 +174,11 @@ class Guard(Generic[S]):
             parked=self._zones.parked(program),
         )
         left = None if deadline is None else max(0.0, deadline - asyncio.get_running_loop().time())
-        return await self._zones.claim(claim, left)
+        return await self._zones.claim(claim, left, self._planner.check)
+
+    async def check(self) -> None:
+        """Raise MotionUnknown if the arm was switched off and on, as it may be while it waits for zones."""
+        await self._planner.check()
 
     @asynccontextmanager
     async def roaming(self) -> AsyncIterator[None]:

@@ -134,6 +134,10 @@ class MagicianPlanner:
         """Whether the arm was switched off and on, and has not been homed since."""
         return self._homed_in != self._arm.restarts
 
+    async def check(self) -> None:
+        """Make sure that it is still the same run of the arm."""
+        await self._arm.check_restart()
+
     async def look(self) -> MagicianStance:
         """Read where the arm stands."""
         pose = await self._arm.request(c.GET_POSE, None)
@@ -144,7 +148,7 @@ class MagicianPlanner:
             rides = await self._arm.request(c.GET_DEVICE_WITH_L, None)
 
         self._rides = rides
-        await self._arm.check_restart()  # last of all, so that what was read is of the same run of the arm
+        await self.check()  # last of all, so that what was read is of the same run of the arm
         joints = Joints(pose.j1, pose.j2, pose.j3, pose.j4)
         return MagicianStance(joints, bias, self._slack(bias), self._heading, rail, rides)
 

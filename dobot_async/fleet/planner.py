@@ -124,8 +124,15 @@ class Planner(Protocol[S]):
     def astray(self) -> bool:
         """Whether the arm has lost its place: it is elsewhere than it tells, until it was homed."""
 
+    async def check(self) -> None:
+        """Make sure that it is still the same run of the arm.
+
+        Raises:
+            MotionUnknown: It turns out to have been switched off and on; its queue was told.
+        """
+
     async def look(self) -> S:
-        """Read where the arm stands.
+        """Read where the arm stands, and make sure that it is still the same run of the arm.
 
         Raises:
             MotionUnknown: It turns out to have been switched off and on; its queue was told.
@@ -196,6 +203,9 @@ class Unplanned:
     def astray(self) -> bool:
         """Whether the arm has lost its place."""
         return self._astray()
+
+    async def check(self) -> None:
+        """Do nothing: these arms do not tell."""
 
     async def look(self) -> Somewhere:
         """Read where the arm stands."""

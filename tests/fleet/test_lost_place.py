@@ -84,6 +84,33 @@ async def test_an_arm_that_was_switched_off_with_nothing_to_do_is_found_out_befo
         assert true_joints(sims["a"]) == before
 
 
+@pytest.mark.parametrize("start", ["alone", "together"])
+def test_an_arm_that_was_switched_off_while_it_waited_for_a_zone_does_not_move(start: str) -> None:
+    async def move(fleet: Fleet[Magician]) -> None:
+        if start == "alone":
+            await fleet["a"].move_to(*IN)
+        else:
+            async with fleet.together("a") as batches:
+                batches["a"].move_to(*IN)
+
+    @virtual
+    async def scene() -> None:
+        async with cell() as (fleet, sims, monitor):
+            waiting = asyncio.create_task(move(fleet))
+            await asyncio.sleep(1)
+            monitor.switch_off_and_on("a")
+            before = true_joints(sims["a"])
+            await asyncio.sleep(1)
+            await fleet["b"].move_to(*RIGHT)
+            with pytest.raises(MotionUnknown, match="a: the arm was switched off and on"):
+                await waiting
+
+            await asyncio.sleep(1)
+            assert true_joints(sims["a"]) == before
+
+    scene()
+
+
 @virtual
 async def test_each_way_of_an_arm_that_was_switched_off_may_lead_anywhere_until_it_was_homed() -> None:
     async with cell() as (fleet, sims, monitor):
@@ -175,6 +202,8 @@ async def test_two_arms_that_have_lost_their_places_home_one_by_one() -> None:
     async with cell(b=RIGHT) as (fleet, sims, monitor):
         for name in fleet:
             await switched_off_and_on(fleet, monitor, name)
+
+        await fleet.recover()
 
         async def homed(name: str) -> None:
             await fleet[name].home()
