@@ -6,6 +6,7 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager, nullcontext, suppress
+from contextvars import ContextVar
 from typing import Any, cast
 
 import anyio
@@ -27,6 +28,10 @@ from dobot_async.fleet.work import named
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Member", "Seat", "tell_to_stop"]
+
+
+recovering: ContextVar[Seat | None] = ContextVar("recovering", default=None)
+"""The arm that is made ready again here: what that takes, such as power, passes though the arm is stopped."""
 
 
 def tell_to_stop(seats: Iterable[Seat]) -> None:
@@ -212,10 +217,20 @@ class Seat:
             named(self.name, error)
             self._failed(self, error)
 
+    async def recover(self) -> None:
+        """Makes the arm ready again, though it may not move yet, and finds out where it is."""
+        before = recovering.set(self)
+        try:
+            await self.arm.recover()
+        finally:
+            recovering.reset(before)
+
+        await self.locate()
+
     def check(self) -> None:
         """Raises MotionStopped if the arm, or the program that asks, may not move any more."""
         here().check()
-        if self.stopped:
+        if self.stopped and recovering.get() is not self:
             raise MotionStopped(f"{self.stopped}; the fleet stays stopped until fleet.recover()")
 
     def tell_to_stop(self) -> None:
