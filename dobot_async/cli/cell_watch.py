@@ -13,6 +13,7 @@ from typing import Any
 import anyio
 
 from dobot_async._core.util.tasks import run_shielded
+from dobot_async.arms.base import Arm
 from dobot_async.cli.arms import FAMILIES
 from dobot_async.cli.cell_program import word_of
 from dobot_async.cli.trace import Trace, TraceFile, traced
@@ -66,13 +67,12 @@ def kind_of(name: str, member: Member[Any], trace: TraceFile | None) -> Any:
     return traced(kind, trace_of(trace, name, member)) if trace else kind
 
 
-async def read(member: Member[Any], arm: Any) -> Reading:
+async def read(member: Member[Any], arm: Arm) -> Reading:
     """Asks an arm for what is shown."""
-    family = family_of(member.kind)
-    place = await family.place(arm)
-    x, y, z, _ = member.base.to_cell(*place)
-    alarms = tuple(map(str, await arm.get_alarms())) if hasattr(arm, "get_alarms") else ()
-    return Reading(family.name, round(x, 3), round(y, 3), round(z, 3), alarms)
+    pose = await arm.get_pose()
+    x, y, z, _ = member.base.to_cell(pose.x, pose.y, pose.z)
+    alarms = tuple(map(str, await arm.get_alarms()))
+    return Reading(family_of(member.kind).name, round(x, 3), round(y, 3), round(z, 3), alarms)
 
 
 async def observe(

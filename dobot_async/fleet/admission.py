@@ -98,5 +98,9 @@ async def claim_for_all(
         movers=arms,
         parked=zones.parked(program),
     )
+
+    async def check() -> None:
+        await side_by_side({name: guard.check() for name, guard in guards.items()})
+
     left = None if deadline is None else max(0.0, deadline - asyncio.get_running_loop().time())
-    return await zones.claim(claim, left)
+    return await zones.claim(claim, left, check)

@@ -22,11 +22,13 @@ class Step:
         motion: The command.
         zones: What it leads through.
         after: The zones in which it ends; None if that is not known, or if it leaves the arm where it is.
+        homing: What the planner has to be told of again when it is done: the arm knows its place then.
     """
 
     motion: Motion
     zones: frozenset[str] = frozenset()
     after: frozenset[str] | None = None
+    homing: object = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -122,7 +122,7 @@ class Crew(Generic[A]):
 
         for seat in others:
             seat.stopped = MotionStopped(f"{seat.name} was stopped because another arm failed: {error}")
-            if seat.arm is None:
+            if not seat.connected:
                 continue
 
             if seat.commands:

@@ -13,14 +13,13 @@ import math
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, nullcontext
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any, TypeVar
 
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.hooks import Hooks
-from dobot_async.errors import ReplyTimeout
+from dobot_async.arms.base import Arm
+from dobot_async.errors import MotionUnknown, ReplyTimeout
 from dobot_async.families import Each
-from dobot_async.fleet.frames import Place
 from dobot_async.fleet.magician_planner import MagicianPlanner
 from dobot_async.fleet.planner import Planner, Unplanned
 from dobot_async.fleet.queue import FleetQueue
@@ -32,6 +31,7 @@ from dobot_async.magician.stopping import STILL
 from dobot_async.mycobot import commands as mycobot
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.queue import CobotBatch, CobotQueue
+from dobot_async.ultraarm import commands as ultraarm
 from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
 from dobot_async.ultraarm.queue import UltraArmBatch, UltraArmQueue
 from dobot_async.wire import Command
@@ -39,9 +39,6 @@ from dobot_async.wire import Command
 __all__ = ["FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "AnyArm", "Family", "family_of"]
 
 AnyArm = Magician | MyCobot | UltraArm
-PLENTY = 1000
-"""Commands that a queue on this side takes."""
-
 LOOK = 0.1  # seconds between two looks at an arm that still does what was left in its queue
 WAYS_DEPEND_ON = (
     magician.EndEffectorParams,
@@ -73,6 +70,19 @@ class FleetMagician(Magician):
         super().__init__(link, **options)
         self._executor.on_unknown = Hooks()  # it told the queue that this one replaces
         self.queue: FleetMagicianQueue = FleetMagicianQueue(self._executor)
+
+    @property
+    def restarts(self) -> int:
+        """How often it was seen to have been switched off and on."""
+        return self._executor.status.restarts
+
+    async def check_restart(self) -> None:
+        """Raises MotionUnknown if an arm with nothing to do was switched off and on; it has failed then."""
+        try:
+            await self._executor.status.check_idle()
+        except MotionUnknown as error:
+            self.queue.give_up(error)
+            raise
 
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
         """Sends any row immediately; what ways depend on, once the fleet allows it; see `Magician.request`."""
@@ -127,6 +137,11 @@ class FleetUltraArm(UltraArm):
         self._executor.on_unknown = Hooks()
         self.queue: FleetUltraArmQueue = FleetUltraArmQueue(self._executor, self.pump)
 
+    @property
+    def homed(self) -> bool:
+        """False once its motors were told to let go, until it was home; that it was switched off does not show."""
+        return self._runner.state.homed
+
     @asynccontextmanager
     async def jogging(self, direction: UltraArmJog | str, **options: Any) -> AsyncIterator[None]:
         """Jogs until the block ends, once the fleet allows it; see `UltraArm.jogging`."""
@@ -144,12 +159,10 @@ class Family:
         kind: Its class in a fleet.
         batch: Makes an empty batch for a queue.
         planner: Makes what knows its ways, and the heading of its rail.
-        recover: Makes it ready again after a failure.
         leftovers: Waits until it has done what an earlier program has left in its queue.
         stop: The command that stops it, is acknowledged, and may be sent twice; None if there is none.
         ask: A cheap question, for measuring how long an answer takes.
-        place: Tells where the tool is.
-        room: Tells how many commands the queue can take while it is paused.
+        room: The question how many commands the arm's queue can take; None for a queue on this side, which takes many.
         pauses: Whether its queue can be paused.
     """
 
@@ -158,58 +171,21 @@ class Family:
     kind: type[Any]
     batch: Callable[[Any], Any]
     planner: Callable[[Any, float | None], Planner[Any]]
-    recover: Callable[[Any], Awaitable[None]]
     leftovers: Callable[[Any], Awaitable[None]]
-    ask: Callable[[Any], Awaitable[object]]
-    place: Callable[[Any], Awaitable[Place]]
-    room: Callable[[Any], Awaitable[int]]
+    ask: Command[None, Any]
+    room: Command[None, int] | None = None
     pauses: bool = True
     stop: Command[None, Any] | None = None
 
 
-class HasCoords(Protocol):
-    """An arm that tells where its tool is."""
-
-    async def get_coords(self) -> Coords:
-        """Returns it."""
+def mycobot_planner(arm: FleetMyCobot, _: float | None) -> Unplanned:
+    """What knows no ways of an arm that always knows its place."""
+    return Unplanned(arm, lambda: False)
 
 
-class Coords(Protocol):
-    """Where a tool is, mm."""
-
-    @property
-    def x(self) -> float:
-        """Forward."""
-
-    @property
-    def y(self) -> float:
-        """To the left."""
-
-    @property
-    def z(self) -> float:
-        """Up."""
-
-
-async def magician_place(arm: Magician) -> Place:
-    """Where a Magician's tool is."""
-    pose = await arm.get_pose()
-    return Place(pose.x, pose.y, pose.z, pose.r)
-
-
-async def coords_place(arm: HasCoords) -> Place:
-    """Where the tool of another arm is."""
-    coords = await arm.get_coords()
-    return Place(coords.x, coords.y, coords.z)
-
-
-def unplanned(arm: HasCoords, _: float | None) -> Unplanned:
-    """What knows no ways."""
-    return Unplanned(partial(coords_place, arm))
-
-
-async def cleared(arm: FleetMyCobot | FleetUltraArm) -> None:
-    """Empties the queue of an arm, and lets it run."""
-    await arm.queue.clear()
+def ultraarm_planner(arm: FleetUltraArm, _: float | None) -> Unplanned:
+    """What knows no ways of an arm that has to be homed."""
+    return Unplanned(arm, lambda: not arm.homed)
 
 
 async def magician_leftovers(arm: FleetMagician) -> None:
@@ -227,7 +203,7 @@ async def magician_leftovers(arm: FleetMagician) -> None:
     await mark
 
 
-async def nothing_left(_: object) -> None:
+async def nothing_left(_: Arm) -> None:
     """An arm without a queue has nothing left but the motion that it is at, which shows."""
 
 
@@ -237,22 +213,15 @@ async def ultraarm_leftovers(arm: FleetUltraArm) -> None:
         await asyncio.sleep(LOOK)
 
 
-async def plenty(_: object) -> int:
-    """What a queue on this side takes, and one that does not have to be paused."""
-    return PLENTY
-
-
 MAGICIAN = Family(
     arm=Magician,
     name="magician",
     kind=FleetMagician,
     batch=lambda arm: Batch(arm.queue),
     planner=MagicianPlanner,
-    recover=lambda arm: cast(Magician, arm).recover(),
     leftovers=magician_leftovers,
-    ask=lambda arm: cast(Magician, arm).request(magician.GET_QUEUED_CMD_CURRENT_INDEX, None),
-    place=magician_place,
-    room=lambda arm: cast(Magician, arm).request(magician.GET_QUEUED_CMD_LEFT_SPACE, None),
+    ask=magician.GET_QUEUED_CMD_CURRENT_INDEX,
+    room=magician.GET_QUEUED_CMD_LEFT_SPACE,
     stop=magician.SET_QUEUED_CMD_FORCE_STOP_EXEC,
 )
 
@@ -261,12 +230,9 @@ MYCOBOT = Family(
     name="mycobot",
     kind=FleetMyCobot,
     batch=lambda arm: CobotBatch(arm.queue, arm.model),
-    planner=unplanned,
-    recover=cleared,
+    planner=mycobot_planner,
     leftovers=nothing_left,
-    ask=lambda arm: cast(MyCobot, arm).request(mycobot.IS_POWER_ON, None),
-    place=coords_place,
-    room=plenty,
+    ask=mycobot.IS_POWER_ON,
 )
 
 ULTRAARM = Family(
@@ -274,12 +240,9 @@ ULTRAARM = Family(
     name="ultraarm",
     kind=FleetUltraArm,
     batch=lambda arm: UltraArmBatch(arm.queue, arm.pump),
-    planner=unplanned,
-    recover=cleared,
+    planner=ultraarm_planner,
     leftovers=ultraarm_leftovers,
-    ask=lambda arm: cast(UltraArm, arm).get_queue_size(),
-    place=coords_place,
-    room=plenty,
+    ask=ultraarm.GET_QUEUE_SIZE,
     pauses=False,
 )
 

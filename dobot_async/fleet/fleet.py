@@ -234,14 +234,9 @@ class Fleet(Crew[A]):
         Raises:
             DobotError: An arm does not recover; the fleet stays stopped.
         """
-
-        async def recovered(seat: Seat) -> None:
-            await seat.family.recover(seat.arm)
-            await seat.locate()
-
         await self._stops_heard()
         reasons = {name: seat.stopped for name, seat in self._seats.items()}
-        await all_of({name: recovered(seat) for name, seat in self._seats.items()})
+        await all_of({name: seat.recover() for name, seat in self._seats.items()})
         self._barriers.forget()
         for name, seat in self._seats.items():
             if seat.stopped is reasons[name]:  # else another failure has stopped it meanwhile

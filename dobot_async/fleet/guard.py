@@ -9,6 +9,8 @@
 3. It is read from the arm alone, when no step is left and the arm has heard its stop and rests.
 4. An arm without anything to do is looked at again before its next motion: it may have been switched off, or led by
    hand.
+5. An arm that was switched off and on does not know where it is: it may be anywhere in its reach, and each of its ways
+   may lead anywhere there, until it was homed.
 
 What is looked at is the tool's place; `clearance` is for what is around it.
 """
@@ -111,15 +113,19 @@ class Guard(Generic[S]):
         if moves:
             await self._be_sure()
 
-        stance, steps, changes = self._stance, [], False
+        planner, ahead = self._planner, list(self._steps)
+        stance, steps, changes = self._stance, list[Step](), False
         for motion in motions:
             value = motion.entry.value
-            plan = await self._planner.plan(value, stance) if motion.moves else self._planner.change(value, stance)
+            plan = await planner.plan(value, stance) if motion.moves else planner.change(value, stance)
             if plan is None:
                 steps.append(Step(motion))
                 continue
 
             if motion.moves:
+                if plan.outline != () and not any(planner.homes(each.motion.entry.value) for each in ahead + steps):
+                    self._check_homed()
+
                 self._limits.check(plan.outline, stance.tool if stance else None)
 
             changes = True
@@ -136,7 +142,7 @@ class Guard(Generic[S]):
 
         self._steps.extend(course.steps)
         for step in course.steps:
-            self._planner.begun(step.motion.entry.value)
+            step.homing = self._planner.begun(step.motion.entry.value)
 
         if course.moves:
             self._plans += 1
@@ -149,6 +155,7 @@ class Guard(Generic[S]):
             ZoneOccupied: Another holds one of them, and this arm does not wait, or in vain.
             ZoneDeadlock: Waiting for it would never end.
             ReplyTimeout: Waiting took too long.
+            MotionUnknown: The arm was switched off and on meanwhile.
         """
         program = here()
         self._zones.drive(self._party.name, program)
@@ -167,13 +174,21 @@ class Guard(Generic[S]):
             parked=self._zones.parked(program),
         )
         left = None if deadline is None else max(0.0, deadline - asyncio.get_running_loop().time())
-        return await self._zones.claim(claim, left)
+        return await self._zones.claim(claim, left, self._planner.check)
+
+    async def check(self) -> None:
+        """Raise MotionUnknown if the arm was switched off and on, as it may be while it waits for zones."""
+        await self._planner.check()
 
     @asynccontextmanager
     async def roaming(self) -> AsyncIterator[None]:
         """While this is entered, the arm may go anywhere."""
+        if self.is_limited:
+            await self._be_sure()
+            self._check_homed()
+
         claim = await self.claim(self._anywhere(), None)
-        async with self._astray(claim):
+        async with self._loosened(claim):
             yield
 
     @asynccontextmanager
@@ -193,7 +208,7 @@ class Guard(Generic[S]):
 
         claim = await self.claim(self._zones_of(plan.region), None)
         self._planner.begun(value)
-        async with self._astray(claim):
+        async with self._loosened(claim):
             for step in self._steps:
                 if step.motion.moves:
                     step.zones, step.after = self._anywhere(), None
@@ -217,6 +232,7 @@ class Guard(Generic[S]):
 
     async def catch_up(self) -> None:
         """Take note of all that is known to have ended: what it held may be what is asked for next."""
+        self._doubt()
         with suppress(DobotError):
             while self._steps and self._steps[0].motion.ended:
                 step = self._steps[0]
@@ -234,6 +250,9 @@ class Guard(Generic[S]):
             return
 
         self._steps.remove(step)
+        if step.homing is not None:
+            self._planner.homed(step.homing)
+
         if step.after is not None:
             self._standing, self._located = step.after, True
         elif step.motion.moves or step.zones:
@@ -271,9 +290,17 @@ class Guard(Generic[S]):
         self._mute = False
         if plans == self._plans and not self._loose:
             self._planner.settled(stance)
-            self._stance, self._located = stance, True
-            self._standing = self._zones_of(stance.region)
-            self._inside = stance.region.zones(self._zones, self._base, ROUNDING)
+            self._located = True
+            if self._planner.astray:
+                self._stance = None
+                self._standing |= self._anywhere()
+                self._inside &= self.holds  # another one may be where it was looked at last
+            else:
+                region, self._stance = stance.region, stance
+                self._standing = self._zones_of(region)
+                inside = region.zones(self._zones, self._base, ROUNDING)
+                self._inside = inside if region.known else frozenset()
+
             self._settle()
 
     async def watch_limits(self) -> str:
@@ -292,9 +319,10 @@ class Guard(Generic[S]):
 
     async def _be_sure(self) -> None:
         """Know where the arm stands, if it has nothing to do; it may have moved since it was looked at last."""
+        self._doubt()
         if not self._located:
             self._forget()
-        elif not self._busy:
+        elif not (self._busy or self._planner.astray):
             plans, seen = self._plans, await self._planner.look()
             if plans == self._plans and self._stance and self._stance.near(seen):
                 self._planner.settled(seen)
@@ -305,8 +333,21 @@ class Guard(Generic[S]):
         if not (self._located or self._busy):
             await self.locate()
 
+    def _doubt(self) -> None:
+        """Trust no place that was read before the arm lost it."""
+        if self._planner.astray and self._stance:
+            self.unsure()
+
+    def _check_homed(self) -> None:
+        """Raise ValueError if the arm has limits, and does not know where it is."""
+        if self.is_limited and self._planner.astray:
+            raise ValueError(
+                f"{self._party.name}: it has lost its place, and cannot be kept within its limits until it was homed; "
+                "await home() first"
+            )
+
     @asynccontextmanager
-    async def _astray(self, claim: Claim | None) -> AsyncIterator[None]:
+    async def _loosened(self, claim: Claim | None) -> AsyncIterator[None]:
         """While this is entered, the arm may be wherever a claim lets it, and its stance is not known."""
         if claim:
             self._claims.append(claim)

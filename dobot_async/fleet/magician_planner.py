@@ -4,6 +4,9 @@ What the arm keeps beside its joints is read together with them: after a restart
 tool that the program has last said to be on the arm is remembered here: if the arm believes something else, its tool
 may be elsewhere by the difference (`slack`).
 
+So is whether it was switched off and on: until it was homed after that it is elsewhere than it tells (`astray`), and
+until it was homed on its rail, anywhere along that.
+
 On a rail the arm and the rail go at once, and nothing tells how fast: a way is all that the arm can touch on it, from
 wherever the rail comes along.
 """
@@ -13,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 from dobot_async.fleet.paths import STEP, Lift, Way, reach_of, way_of
 from dobot_async.fleet.planner import XYZ, Discs, Plan, Points, Region
@@ -35,8 +38,22 @@ Span = tuple[float, float]
 class Asked(Protocol):
     """A Magician, as far as it is asked."""
 
+    @property
+    def restarts(self) -> int:
+        """How often it was seen to have been switched off and on."""
+
+    async def check_restart(self) -> None:
+        """Raise MotionUnknown if it was switched off and on since this was asked last; its motions end."""
+
     async def request(self, command: Command[Q, R], value: Q) -> R:
         """Send any row of the command table immediately, and return the arm's answer."""
+
+
+class Homing(NamedTuple):
+    """A homing that was begun: after how many restarts, and whether the arm was told of its rail then."""
+
+    restarts: int
+    rides: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +125,18 @@ class MagicianPlanner:
         self._said: list[c.EndEffectorParams] = []  # one of these is on the arm
         self._bias = c.EndEffectorParams(0.0)
         self._longest = 0.0  # mm from the wrist, of all end effectors so far
+        self._rides = False  # whether the arm was told of its rail, as far as that is known
+        self._homed_in = 0  # after which of its restarts the arm was homed last
+        self._rail_homed_in = 0
+
+    @property
+    def astray(self) -> bool:
+        """Whether the arm was switched off and on, and has not been homed since."""
+        return self._homed_in != self._arm.restarts
+
+    async def check(self) -> None:
+        """Make sure that it is still the same run of the arm."""
+        await self._arm.check_restart()
 
     async def look(self) -> MagicianStance:
         """Read where the arm stands."""
@@ -118,6 +147,8 @@ class MagicianPlanner:
         if self._heading is not None:
             rides = await self._arm.request(c.GET_DEVICE_WITH_L, None)
 
+        self._rides = rides
+        await self.check()  # last of all, so that what was read is of the same run of the arm
         joints = Joints(pose.j1, pose.j2, pose.j3, pose.j4)
         return MagicianStance(joints, bias, self._slack(bias), self._heading, rail, rides)
 
@@ -157,10 +188,25 @@ class MagicianPlanner:
 
         return self._change_tool(value, start) if isinstance(value, c.EndEffectorParams) else None
 
-    def begun(self, value: object) -> None:
+    def homes(self, value: object) -> bool:
+        """Return whether it is a homing."""
+        return isinstance(value, c.HOMECmd)
+
+    def begun(self, value: object) -> Homing | None:
         """Take note that a command is on its way: an end effector that the program says is on the arm from now on."""
         if isinstance(value, c.EndEffectorParams):
             self._said.append(value)
+        elif isinstance(value, c.DeviceWithL):
+            self._rides = value.is_with_l
+
+        return Homing(self._arm.restarts, self._rides) if self.homes(value) else None
+
+    def homed(self, homing: object) -> None:
+        """Take note that a homing is done: of the arm, and of its rail if it was told of one."""
+        if isinstance(homing, Homing):
+            self._homed_in = homing.restarts
+            if homing.rides:
+                self._rail_homed_in = homing.restarts
 
     def settled(self, stance: MagicianStance) -> None:
         """Take note of the end effector that the arm was told of last, unless it has forgotten it."""
@@ -196,7 +242,7 @@ class MagicianPlanner:
 
         # An arm that was not told of its rail leaves it alone.
         swept = (min(start.rail[0], value.rail), max(start.rail[1], value.rail)) if start.rides else start.rail
-        there = (value.rail, value.rail) if start.rides else start.rail
+        there = (value.rail, value.rail) if start.rides and self._knows_rail else start.rail
         # A box that contains both ends of the rail's way contains what lies between.
         outline = shifted(way.places, self._heading, (*start.rail, *there))
         return Plan(start.along(way.places, swept), replace(start, joints=way.end, rail=there), outline)
@@ -241,12 +287,20 @@ class MagicianPlanner:
         return [lift_of(same), lift_of(apart), *start.lifts]
 
     async def _read_rail(self) -> Span:
-        """Where the arm stands on its rail: anywhere, for one that does not tell."""
+        """Where the arm stands on its rail: anywhere, for one that does not tell, or does not know."""
         if self._heading is None:
             return 0.0, 0.0
 
+        if not self._knows_rail:
+            return 0.0, RAIL_LENGTH
+
         place = await self._arm.request(c.GET_POSE_L, None)
         return (place, place) if math.isfinite(place) else (0.0, RAIL_LENGTH)
+
+    @property
+    def _knows_rail(self) -> bool:
+        """Whether the arm knows where it is on its rail, if it is told of that."""
+        return self._rail_homed_in == self._arm.restarts
 
     def _slack(self, bias: c.EndEffectorParams) -> float:
         """How far the tool may be from where the arm believes it is: it has forgotten what was said last."""

@@ -10,11 +10,12 @@ Lengths are mm, in the arm's coordinates where it stands at l = 0 of its rail.
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
-from dobot_async.fleet.frames import BaseFrame, Place
+from dobot_async.arms.base import Arm
+from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.zones import Zones
 
 __all__ = ["XYZ", "Discs", "Plan", "Planner", "Points", "Region", "Stance", "Unplanned"]
@@ -24,6 +25,10 @@ XYZ = tuple[float, float, float]
 
 class Region(Protocol):
     """Where a tool may be."""
+
+    @property
+    def known(self) -> bool:
+        """Whether the tool is known to be in each zone of it; else in any of them, or in none."""
 
     def zones(self, zones: Zones, base: BaseFrame, margin: float) -> frozenset[str]:
         """Return the zones that it touches, or comes nearer to than `margin` mm."""
@@ -40,6 +45,11 @@ class Points:
 
     places: Sequence[XYZ]
     slack: float = 0.0
+
+    @property
+    def known(self) -> bool:
+        """True, for those of a stance: there is one."""
+        return True
 
     def zones(self, zones: Zones, base: BaseFrame, margin: float) -> frozenset[str]:
         """Return the zones at the places."""
@@ -62,6 +72,11 @@ class Discs:
 
     centres: Sequence[tuple[float, float]] = ((0.0, 0.0),)
     radius: float = math.inf
+
+    @property
+    def known(self) -> bool:
+        """False."""
+        return False
 
     def zones(self, zones: Zones, base: BaseFrame, margin: float) -> frozenset[str]:
         """Return the zones that they touch."""
@@ -105,8 +120,23 @@ class Plan(NamedTuple, Generic[S]):
 class Planner(Protocol[S]):
     """What a family knows of the ways of its arms."""
 
+    @property
+    def astray(self) -> bool:
+        """Whether the arm has lost its place: it is elsewhere than it tells, until it was homed."""
+
+    async def check(self) -> None:
+        """Make sure that it is still the same run of the arm.
+
+        Raises:
+            MotionUnknown: It turns out to have been switched off and on; its queue was told.
+        """
+
     async def look(self) -> S:
-        """Read where the arm stands."""
+        """Read where the arm stands, and make sure that it is still the same run of the arm.
+
+        Raises:
+            MotionUnknown: It turns out to have been switched off and on; its queue was told.
+        """
 
     async def tool(self) -> XYZ:
         """Read where its tool is, and nothing else."""
@@ -125,8 +155,14 @@ class Planner(Protocol[S]):
     def change(self, value: object, start: S | None) -> Plan[S] | None:
         """Return what a command does that moves nothing: where the tool is then; None if it changes no way."""
 
-    def begun(self, value: object) -> None:
-        """Take note that a command is on its way to the arm."""
+    def homes(self, value: object) -> bool:
+        """Return whether an arm that has done this command knows its place."""
+
+    def begun(self, value: object) -> object:
+        """Take note that a command is on its way to the arm; return what `homed` needs, None if it does not home."""
+
+    def homed(self, homing: object) -> None:
+        """Take note that a homing is done, of which `begun` has returned this."""
 
     def settled(self, stance: S) -> None:
         """Take note that the arm has nothing to do, and how it was seen then."""
@@ -155,11 +191,21 @@ class Unplanned:
     """The planner of arms whose ways are not known: each may lead anywhere.
 
     Args:
-        place: Reads where the tool is.
+        arm: The arm.
+        astray: Tells whether it is elsewhere than the arm says, for the arm has to be homed.
     """
 
-    def __init__(self, place: Callable[[], Awaitable[Place]]) -> None:
-        self._place = place
+    def __init__(self, arm: Arm, astray: Callable[[], bool]) -> None:
+        self._arm = arm
+        self._astray = astray
+
+    @property
+    def astray(self) -> bool:
+        """Whether the arm has lost its place."""
+        return self._astray()
+
+    async def check(self) -> None:
+        """Do nothing: these arms do not tell."""
 
     async def look(self) -> Somewhere:
         """Read where the arm stands."""
@@ -167,8 +213,8 @@ class Unplanned:
 
     async def tool(self) -> XYZ:
         """Read where its tool is."""
-        x, y, z, _ = await self._place()
-        return x, y, z
+        pose = await self._arm.get_pose()
+        return pose.x, pose.y, pose.z
 
     async def plan(self, value: object, start: Somewhere | None) -> Plan[Somewhere]:  # noqa: ARG002 - no way is known
         """Return anywhere."""
@@ -177,8 +223,15 @@ class Unplanned:
     def change(self, value: object, start: Somewhere | None) -> None:
         """Return None: as no way is known, none changes."""
 
+    def homes(self, value: object) -> bool:  # noqa: ARG002 - limits alone ask, and these arms have none
+        """Return False."""
+        return False
+
     def begun(self, value: object) -> None:
         """Do nothing."""
+
+    def homed(self, homing: object) -> None:
+        """Do nothing: the arm itself takes note of it."""
 
     def settled(self, stance: Somewhere) -> None:
         """Do nothing."""

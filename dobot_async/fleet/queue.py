@@ -10,7 +10,6 @@ from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import AbstractAsyncContextManager, nullcontext
 from typing import Any, Protocol
 
-from dobot_async._core.link.link import Link
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
@@ -18,7 +17,7 @@ from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import DobotError
 from dobot_async.fleet.zones import here
 
-__all__ = ["FleetArm", "FleetQueue", "Overseer"]
+__all__ = ["FleetQueue", "Overseer"]
 
 
 class Overseer(Protocol):
@@ -41,18 +40,6 @@ class Overseer(Protocol):
 
     def ended(self, error: DobotError) -> None:
         """Takes note of what ends all motions of the arm."""
-
-
-class FleetArm(Protocol):
-    """An arm in a fleet, whatever its family."""
-
-    @property
-    def link(self) -> Link[Any]:
-        """Its connection."""
-
-    @property
-    def queue(self) -> FleetQueue:
-        """Its queue."""
 
 
 class FleetQueue(MotionQueue):

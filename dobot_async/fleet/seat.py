@@ -6,13 +6,15 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager, nullcontext, suppress
-from typing import Any
+from contextvars import ContextVar
+from typing import Any, cast
 
 import anyio
 
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
+from dobot_async.arms.base import Arm
 from dobot_async.contract import LinkState
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.fleet.claims import Claim, Party, Pause
@@ -21,11 +23,15 @@ from dobot_async.fleet.families import Family, family_of
 from dobot_async.fleet.guard import Guard
 from dobot_async.fleet.limits import Limits
 from dobot_async.fleet.member import Member
-from dobot_async.fleet.queue import FleetArm, FleetQueue
+from dobot_async.fleet.queue import FleetQueue
 from dobot_async.fleet.work import named
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Member", "Seat", "tell_to_stop"]
+
+
+recovering: ContextVar[Seat | None] = ContextVar("recovering", default=None)
+"""The arm that is made ready again here: what that takes, such as power, passes though the arm is stopped."""
 
 
 def tell_to_stop(seats: Iterable[Seat]) -> None:
@@ -42,7 +48,6 @@ class Seat:
         member: What it is.
         family: Its family.
         party: As what it holds zones.
-        arm: The arm, once it is connected.
         stopped: Why it may not move; None while all is well.
         commands: Whether it is connected to command it, not only to look on.
         stops_on_error: Whether it stops when the fleet is left by an error.
@@ -60,7 +65,7 @@ class Seat:
         self.member = member
         self.family: Family = family_of(member.kind)
         self.party = zones.arms[name]
-        self.arm: Any = None  # a FleetArm, and what its user takes it for
+        self._arm: Arm | None = None
         self.stopped: DobotError | None = None
         self.commands = self.stops_on_error = False
         self._zones = zones
@@ -76,14 +81,24 @@ class Seat:
         self._follower: asyncio.Task[None] | None = None
 
     @property
+    def connected(self) -> bool:
+        """Whether there is an arm yet."""
+        return self._arm is not None
+
+    @property
+    def arm(self) -> Arm:
+        """The arm, once it is connected."""
+        assert self._arm, f"{self.name} is not connected yet"
+        return self._arm
+
+    @property
     def queue(self) -> FleetQueue:
         """The arm's queue."""
-        arm: FleetArm = self.arm
-        return arm.queue
+        return cast(FleetQueue, self.arm.queue)  # each class of `Family.kind` has one
 
-    async def begin(self, arm: FleetArm, options: Mapping[str, Any]) -> None:
+    async def begin(self, arm: Arm, options: Mapping[str, Any]) -> None:
         """Takes an arm that was just connected, with these options."""
-        self.arm = arm
+        self._arm = arm
         member = self.member
         self.commands = options.get("control", True)
         self.stops_on_error = self.commands and options.get("on_error", "stop") == "stop"
@@ -94,7 +109,7 @@ class Seat:
             self._guard = guard = Guard(
                 self._steps,
                 self.family.planner(arm, member.rail),
-                arm.queue,
+                self.queue,
                 self._zones,
                 self.party,
                 base=member.base,
@@ -116,7 +131,7 @@ class Seat:
 
     def end(self) -> set[asyncio.Task[None]]:
         """Leaves the arm to itself; returns the tasks that end because of it."""
-        if self.arm:
+        if self.connected:
             self.queue.overseer = None
 
         for task in self._tasks:
@@ -202,10 +217,20 @@ class Seat:
             named(self.name, error)
             self._failed(self, error)
 
+    async def recover(self) -> None:
+        """Makes the arm ready again, though it may not move yet, and finds out where it is."""
+        before = recovering.set(self)
+        try:
+            await self.arm.recover()
+        finally:
+            recovering.reset(before)
+
+        await self.locate()
+
     def check(self) -> None:
         """Raises MotionStopped if the arm, or the program that asks, may not move any more."""
         here().check()
-        if self.stopped:
+        if self.stopped and recovering.get() is not self:
             raise MotionStopped(f"{self.stopped}; the fleet stays stopped until fleet.recover()")
 
     def tell_to_stop(self) -> None:

@@ -39,6 +39,7 @@ class Collected(Protocol):
 
 B = TypeVar("B", bound=Collected)
 SAMPLES = 7
+PLENTY = 1000  # commands that a queue on this side takes
 LEAD = 0.003  # seconds from the decision to the first release, for all to be ready to send
 
 
@@ -218,7 +219,7 @@ class Launch:
 
 async def room(seat: Seat) -> int:
     """Returns how many commands an arm takes while it is paused."""
-    return await seat.family.room(seat.arm)
+    return await seat.arm.request(seat.family.room, None) if seat.family.room else PLENTY
 
 
 async def measure(seat: Seat) -> float:
@@ -227,7 +228,7 @@ async def measure(seat: Seat) -> float:
     trips = []
     for _ in range(SAMPLES):
         asked = loop.time()
-        await seat.family.ask(seat.arm)
+        await seat.arm.request(seat.family.ask, None)
         trips.append(loop.time() - asked)
 
     return statistics.median(trips) / 2

@@ -193,8 +193,15 @@ class Zones:
         finally:
             self.claims.release(claim)
 
-    async def claim(self, claim: Claim, timeout: float | None) -> Claim:
+    async def claim(
+        self, claim: Claim, timeout: float | None, check: Callable[[], Awaitable[None]] | None = None
+    ) -> Claim:
         """Returns a claim once it is granted.
+
+        Args:
+            claim: The claim.
+            timeout: Seconds.
+            check: Raises if the claim has lost its purpose; called when it was not granted at once.
 
         Raises:
             ZoneOccupied: It would have to wait, and is not patient; or a holder has failed.
@@ -216,6 +223,7 @@ class Zones:
                 if not answered.done():
                     self.claims.request(claim)
 
+                waits = not answered.done()
                 error = await answered
         except BaseException as failure:
             self.claims.release(claim)
@@ -227,6 +235,13 @@ class Zones:
 
         if error:
             raise another(error)  # a failure may answer several claims
+
+        if waits and check:
+            try:
+                await check()
+            except BaseException:
+                self.claims.release(claim)
+                raise
 
         return claim
 

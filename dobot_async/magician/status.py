@@ -49,15 +49,18 @@ class ArmStatus:
 
     Attributes:
         completed: The highest index that is known to be finished, -1 before there is one.
+        restarts: How often the arm was seen to have been switched off and on.
     """
 
     def __init__(self, link: Link[Any], restarted: Callable[[], None]) -> None:
         self.completed = -1
+        self.restarts = 0
         self._link = link
         self._on_restart = restarted
         self._now = asyncio.get_running_loop().time
         self._restart_known = True
         self._reading: Reading | None = None
+        self._clockless = False
         self._outages = 0
 
     async def ask(self, command: Command[Q, R], value: Q | None = None) -> R:
@@ -116,6 +119,7 @@ class ArmStatus:
             if self._link.heard_at < asked_at:
                 raise
 
+            self._clockless = True
             logger.warning("%s does not tell its clock; that it was switched off and on may go unseen", self._link.url)
 
     async def check_run(self) -> None:
@@ -131,6 +135,13 @@ class ArmStatus:
 
         raise self.restarted()
 
+    async def check_idle(self) -> None:
+        """Raise MotionUnknown if an idle arm was switched off and on; note its clock the first time. V1.1."""
+        if self._reading is None and not self._clockless:
+            await self.remember()
+        else:
+            await self.check_run()
+
     async def check_outage(self, highest: int | None) -> None:
         """After an outage of the link, raise MotionUnknown if the arm was switched off meanwhile."""
         await self._link.opened()
@@ -145,6 +156,7 @@ class ArmStatus:
     def restarted(self) -> MotionUnknown:
         """Note that the arm was switched off and on; return what to raise."""
         self.completed = -1
+        self.restarts += 1
         self._reading = None
         self._outages = self._link.outages
         self._on_restart()

@@ -1,4 +1,4 @@
-"""Watches where the tools of simulated arms really are. It knows the arms' joints, and nothing of the driver.
+"""Watches where the tools of simulated arms really are. It knows the arms' true joints, and nothing of the driver.
 
 Its kinematics is written from the drawing of the arm in the vendor's manual, for itself: the rear arm of 135 mm stands
 upright at joint 2 = 0, the forearm of 147 mm lies level at joint 3 = 0 and sinks with it, and the tool is carried level
@@ -20,9 +20,15 @@ from typing import Any
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation
 
-__all__ = ["Monitor", "Stand", "Violation", "Zone"]
+__all__ = ["Monitor", "Stand", "Violation", "Zone", "true_joints"]
 
 LOOK = 0.004  # virtual seconds between two looks
+
+
+def true_joints(sim: Simulation) -> tuple[float, ...]:
+    """Where the joints of an arm, and its rail, really are; the arm may believe something else."""
+    pose = sim.arm.true_pose
+    return pose.j1, pose.j2, pose.j3, pose.j4, sim.arm.true_rail
 
 
 class Violation(AssertionError):
@@ -104,7 +110,7 @@ class Monitor:
 
     def place(self, name: str) -> tuple[float, float, float]:
         """Where a tool is."""
-        return self.stands[name].tool(self.sims[name].arm.device.joints, self.tool(name))
+        return self.stands[name].tool(true_joints(self.sims[name]), self.tool(name))
 
     def look(self) -> None:
         """Looks once; raises Violation if two tools are in one zone."""

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any, Literal
 
-from monitor import Monitor, Stand, Violation, Zone
+from monitor import Monitor, Stand, Violation, Zone, true_joints
 from virtual import run_virtual
 
 from dobot_async import ConnectionLost, DobotError, Fleet, Jog, Magician, PTPMode
@@ -91,22 +91,28 @@ class Cell:
                 self.say(f"{asyncio.get_running_loop().time():8.3f} {name} {what.__name__}: done")
 
     async def ready(self, name: str, random: Random) -> None:
-        """Makes an arm ready again that has failed; now and then its tool is said anew."""
+        """Makes an arm ready again that has failed; now and then tool and rail are said anew, and it is homed."""
         with suppress(DobotError, ValueError, TimeoutError):
             async with asyncio.timeout(20):
                 await self.fleet[name].recover()
                 if random.random() < 0.5:
                     await self.fleet[name].set_end_effector(c.EndEffectorParams(*self.monitor.tool(name)))
 
+                if self.monitor.stands[name].rail is not None and random.random() < 0.5:
+                    await self.fleet[name].set_rail()
+
+                if random.random() < 0.5:
+                    await self.fleet[name].home()
+
     async def stop(self) -> None:
         """Stops all at some moment; nobody may move any more soon after that has returned, whatever programs do."""
         await asyncio.sleep(self.random.uniform(0, 5))
         await self.fleet.stop()
         await asyncio.sleep(GRACE)
-        stood = {name: sim.arm.device.joints for name, sim in self.sims.items()}
+        stood = {name: true_joints(sim) for name, sim in self.sims.items()}
         for _ in range(round(WATCHED / LOOK)):
             await asyncio.sleep(LOOK)
-            moved = [name for name, sim in self.sims.items() if sim.arm.device.joints != stood[name]]
+            moved = [name for name, sim in self.sims.items() if true_joints(sim) != stood[name]]
             if moved:
                 raise Violation(f"{moved} moved after the stop of the fleet")
 
@@ -313,6 +319,10 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
                 simulate(speed=SPEED, seed=random.randrange(1 << 30), faults=faults, homed=True)
             )
             sim.arm.guide_to(*AWAY)
+            if stand.rail is not None and random.random() < 0.8:
+                async with Magician.connect(sim.url) as arm:
+                    await arm.set_rail()
+
             keep = random.random() < 0.3 and not any(each.options["queue"] == "keep" for each in members.values())
             if keep:
                 await leave_something(sim, random)

@@ -11,9 +11,10 @@ import pytest
 from virtual import virtual
 
 from dobot_async import ArmAlarm, ConnectFailed, ConnectionLost, Fleet, Magician, MotionStopped, MyCobot, UltraArm
+from dobot_async.arms.base import Arm
 from dobot_async.fleet import BarrierBroken, Member
 from dobot_async.fleet.fleet import OnFailure
-from dobot_async.fleet.queue import FleetArm
+from dobot_async.fleet.guard import Mode
 from dobot_async.fleet.seat import Seat
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate
@@ -293,7 +294,7 @@ async def test_a_lost_link_is_noticed_although_nobody_asks() -> None:
 async def test_a_link_that_is_lost_before_its_arm_has_its_seat_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     begin = Seat.begin
 
-    async def begin_too_late(seat: Seat, arm: FleetArm, options: Mapping[str, Any]) -> None:
+    async def begin_too_late(seat: Seat, arm: Arm, options: Mapping[str, Any]) -> None:
         if seat.name == "left":
             sims["left"].unplug()
             await anext(aiter(arm.link.state))
@@ -305,6 +306,38 @@ async def test_a_link_that_is_lost_before_its_arm_has_its_seat_is_noticed(monkey
         assert isinstance(fleet.failures["left"], ConnectionLost)
         with pytest.raises(MotionStopped, match="left"):
             await fleet["right"].move_to(*NEAR)
+
+
+@pytest.mark.parametrize("guard", ["off", "wait"])
+def test_recover_gives_an_ultraarm_its_power_back_and_lets_nothing_else_through(guard: Mode) -> None:
+    @virtual
+    async def scene() -> None:
+        async with (
+            simulate(speed=20) as one,
+            simulate("ultraarm", homed=True, speed=20, faults=Faults(latency=0.05)) as two,
+        ):
+            members = {"one": Member[Any](one.url, Magician), "two": Member[Any](two.url, UltraArm, guard=guard)}
+            async with Fleet.connect(members) as fleet:
+                arm = fleet.arm("two", UltraArm)
+                await arm.release()
+                with pytest.raises(ArmAlarm):
+                    await fleet.arm("one", Magician).move_to(*TOO_FAR)
+
+                with pytest.raises(MotionStopped):
+                    await arm.power_on()
+
+                recovering = asyncio.create_task(fleet.recover())
+                await asyncio.sleep(0.08)
+                assert not recovering.done()
+                with pytest.raises(MotionStopped, match=r"until fleet\.recover"):
+                    await arm.home()
+
+                await recovering
+                assert two.arm.registers.powered
+                await arm.home()
+                assert two.arm.registers.homed
+
+    scene()
 
 
 @pytest.mark.parametrize(("reach", "stopped"), [("fleet", {"b", "c"}), ("group", {"b"}), ("alone", set())])

@@ -8,7 +8,7 @@ from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from typing import Any
 
 import pytest
-from monitor import Monitor, Stand
+from monitor import Monitor, Stand, true_joints
 from virtual import virtual
 
 from dobot_async import ArmAlarm, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
@@ -30,7 +30,7 @@ async def cell(
 ) -> AsyncIterator[Cell]:
     """Two guarded arms at one place, which only a simulation allows: what one can reach, the other one can."""
     async with AsyncExitStack() as stack:
-        sims = {name: await stack.enter_async_context(simulate(speed=speed)) for name in ("a", "b")}
+        sims = {name: await stack.enter_async_context(simulate(speed=speed, homed=True)) for name in ("a", "b")}
         for name, sim in sims.items():
             sim.arm.guide_to(*(at or {"a": OUT, "b": ASIDE})[name])
 
@@ -64,7 +64,7 @@ async def left_behind(sim: Simulation) -> None:
 
 @virtual
 async def test_an_arm_with_leftovers_may_go_anywhere_until_they_are_done() -> None:
-    async with simulate(speed=5) as sa, simulate(speed=5) as sb:
+    async with simulate(speed=5, homed=True) as sa, simulate(speed=5, homed=True) as sb:
         sa.arm.guide_to(*OUT)
         sb.arm.guide_to(*ASIDE)
         await left_behind(sa)
@@ -82,7 +82,7 @@ async def test_an_arm_with_leftovers_may_go_anywhere_until_they_are_done() -> No
 
 @virtual
 async def test_leftovers_that_are_cleared_hold_nothing_back() -> None:
-    async with simulate(speed=5) as sa, simulate(speed=5) as sb:
+    async with simulate(speed=5, homed=True) as sa, simulate(speed=5, homed=True) as sb:
         sa.arm.guide_to(*OUT)
         sb.arm.guide_to(*ASIDE)
         await left_behind(sa)
@@ -210,7 +210,7 @@ async def test_an_arm_that_was_switched_off_has_forgotten_its_tool_and_the_guard
 @virtual
 async def test_a_rail_is_part_of_where_the_arm_stands() -> None:
     far = Box((240, 300), (560, 640), (0, 80))
-    async with simulate(speed=5) as sa, simulate(speed=5) as sb:
+    async with simulate(speed=5, homed=True) as sa, simulate(speed=5, homed=True) as sb:
         sa.arm.guide_to(*OUT)
         sb.arm.guide_to(*OUT)
         members = {
@@ -224,14 +224,19 @@ async def test_a_rail_is_part_of_where_the_arm_stands() -> None:
             with pytest.raises(ValueError, match="0 to 1000 mm"):
                 await fleet["a"].move_to(*OUT, l=1001)
 
-            await fleet["b"].move_to(*IN)
+            assert fleet.holders("far") == ["a"], "an arm that was not told of its rail may be anywhere along it"
+            with pytest.raises(ReplyTimeout, match="did not get zone far"):
+                await asyncio.create_task(fleet["b"].queue.move_to(*IN, timeout=1))
+
             await fleet["a"].set_rail()
+            assert fleet.holders("far") == []
+            await fleet["b"].move_to(*IN)
             riding = asyncio.create_task(fleet["a"].move_to(*IN, l=600))
             await asyncio.sleep(2)
             assert sa.arm.rail == 0
             await fleet["b"].move_to(*OUT)
             await riding
-            assert far.contains(*Stand(rail=90).tool(sa.arm.device.joints, (59.7, 0, 0)))
+            assert far.contains(*Stand(rail=90).tool(true_joints(sa), (59.7, 0, 0)))
             assert fleet.holders("far") == ["a"]
             await fleet["a"].move_to(*OUT)
             await asyncio.sleep(0.1)
@@ -268,7 +273,7 @@ async def test_arms_that_start_together_cannot_share_a_zone() -> None:
 @virtual
 async def test_a_start_together_waits_for_all_its_zones_and_holds_none_before() -> None:
     async with AsyncExitStack() as stack:
-        sims = {name: await stack.enter_async_context(simulate(speed=5)) for name in "abc"}
+        sims = {name: await stack.enter_async_context(simulate(speed=5, homed=True)) for name in "abc"}
         for sim in sims.values():
             sim.arm.guide_to(*OUT)
 
