@@ -1,4 +1,4 @@
-"""Boxes and upright cylinders in the cell's frame, mm."""
+"""Boxes and upright cylinders, mm: in the frame of a cell, or in the coordinates of one arm."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def check_span(name: str, span: Span) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A box along the axes of the cell.
+    """A box along the axes.
 
     Attributes:
         x: Lowest and highest, mm.
