@@ -120,15 +120,15 @@ class MagicianKeeper(Keeper[Stand]):
             return joints_of(goal)
 
         try:
-            way = way_of(value, start.joints, start.kinematics, await self._lifts(value, start))
+            ways = [way_of(value, start.joints, start.kinematics, each) for each in await self._lifts(value, start)]
         except Unreachable:  # as the arm will say
             return None
 
-        if way is None:
-            return None
+        known = [way for way in ways if way]
+        for way in known:
+            self.workspace.check_way(way.places)
 
-        self.workspace.check_way(way.places)
-        return way.end
+        return known[0].end if known else None
 
     def _check_places(self, goal: Goal, value: Any) -> Goal:
         """Check where a motion leads, and by which place, as far as that is known; return the goal."""
@@ -142,13 +142,13 @@ class MagicianKeeper(Keeper[Stand]):
 
         return goal
 
-    async def _lifts(self, value: Any, start: Stand) -> list[Lift]:
-        """The lifts that a jump may have: those that the arm keeps, and those on their way to it."""
+    async def _lifts(self, value: Any, start: Stand) -> list[list[Lift]]:
+        """The lifts that a jump may have, one for each way: those that the arm keeps, and those on their way to it."""
         if getattr(value, "ptp_mode", None) not in JUMPS:
-            return []
+            return [[]]
 
         kept = [await self._ask(row) for row in (c.GET_PTP_JUMP_PARAMS, c.GET_PTP_JUMP2_PARAMS)]
-        return [*map(lift_of, kept), *start.lifts]
+        return [[lift] for lift in {*map(lift_of, kept), *start.lifts}]
 
 
 def check_jog(value: Any) -> None:
