@@ -19,6 +19,7 @@ from dobot_async import (
     CommandRejected,
     Cylinder,
     DobotError,
+    Fleet,
     Magician,
     MotionStopped,
     MoveMode,
@@ -30,6 +31,7 @@ from dobot_async import (
     Workspace,
 )
 from dobot_async._core.util.shapes import Shape
+from dobot_async.fleet import Member
 from dobot_async.magician import commands as c
 from dobot_async.mycobot import commands as mycobot
 from dobot_async.simulator import DeviceOptions, Simulation, simulate
@@ -190,7 +192,7 @@ async def perform(family: str, plan: Plan, workspace: Workspace | None) -> tuple
 
 
 @pytest.mark.parametrize("family", list(MODES))
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(plan=plans)
 def test_an_arm_never_leaves_its_workspace(family: str, plan: Plan) -> None:
     async def run() -> None:
@@ -430,10 +432,23 @@ async def test_gcode_is_looked_at_as_a_whole() -> None:
 
 
 @virtual
+async def test_an_arm_in_a_fleet_keeps_its_workspace_too() -> None:
+    async with simulate() as sim:
+        member = Member(sim.url, Magician, {"workspace": SPACE})
+        async with Fleet.connect({"left": member}) as fleet:
+            arm = fleet["left"]
+            await arm.home()
+            await arm.move_to(200, -80, 50)
+            with pytest.raises(OutsideWorkspace):
+                await arm.move_to(200, 80, 50, mode=PTPMode.MOVL_XYZ)
+
+
+@virtual
 async def test_what_is_no_workspace_is_refused_by_all_arms() -> None:
-    for kind in (Magician, MyCobot, UltraArm):
+    kinds: tuple[Any, ...] = (Magician, MyCobot, UltraArm)
+    for kind in kinds:
         with pytest.raises(TypeError, match="workspace must be a Workspace"):
-            async with kind.connect("sim:", workspace="here"):  # type: ignore[attr-defined]
+            async with kind.connect("sim:", workspace="here"):
                 pass
 
     with pytest.raises(TypeError, match="allowed must be"):
