@@ -43,7 +43,7 @@ NEAR = 0.2  # mm by which a way between two places that are looked at may be off
 SPACE = Workspace(Box(x=(150, 260), y=(-130, 130), z=(0, 120)), forbidden=Cylinder(215, 0, 20, z=(-100, 60)))
 COBOT = Workspace(Box(x=(120, 230), y=(-130, 130), z=(120, 260)), forbidden=Box(x=(160, 190), y=(-30, 30)))
 DOWN = (180.0, 0.0, -90.0)
-INDICES = {"magician": (Magician, SPACE), "mycobot280": (MyCobot, COBOT), "ultraarm": (UltraArm, SPACE)}
+SPACES = {"magician": (Magician, SPACE), "mycobot280": (MyCobot, COBOT), "ultraarm": (UltraArm, SPACE)}
 
 
 def inside(space: Workspace, place: XYZ) -> bool:
@@ -58,7 +58,8 @@ def true_place(sim: Simulation[Any]) -> XYZ:
         pose = sim.arm.true_pose
         return pose.x, pose.y, pose.z
 
-    return sim.arm.coords[:3] if hasattr(sim.arm, "coords") else forward(sim.arm.device.joints)[:3]  # type: ignore[no-any-return]
+    x, y, z, *_ = sim.arm.coords if hasattr(sim.arm, "coords") else forward(sim.arm.device.joints)
+    return x, y, z
 
 
 @asynccontextmanager
@@ -81,11 +82,9 @@ async def traced(sim: Simulation[Any]) -> AsyncIterator[list[XYZ]]:
 
 
 @asynccontextmanager
-async def standing(
-    family: str, workspace: Workspace | None, **options: Any
-) -> AsyncIterator[tuple[Simulation[Any], Any]]:
+async def standing(family: str, workspace: Workspace | None) -> AsyncIterator[tuple[Simulation[Any], Any]]:
     """An arm of a family that stands in its workspace, in front of what is forbidden."""
-    kind: Any = INDICES[family][0]
+    kind: Any = SPACES[family][0]
     options: dict[str, Any] = {"model": family} if family == "mycobot280" else {}
     async with simulate(family) as sim:
         async with kind.connect(sim.url, **options) as arm:
@@ -196,8 +195,8 @@ async def perform(family: str, plan: Plan, workspace: Workspace | None) -> tuple
 @given(plan=plans)
 def test_an_arm_never_leaves_its_workspace(family: str, plan: Plan) -> None:
     async def run() -> None:
-        places, _ = await perform(family, plan, INDICES[family][1])
-        assert all(inside(INDICES[family][1], place) for place in places)
+        places, _ = await perform(family, plan, SPACES[family][1])
+        assert all(inside(SPACES[family][1], place) for place in places)
 
     run_virtual(run())
 
@@ -205,7 +204,7 @@ def test_an_arm_never_leaves_its_workspace(family: str, plan: Plan) -> None:
 @pytest.mark.parametrize("family", list(MODES))
 @virtual
 async def test_without_a_workspace_the_same_motions_leave_it(family: str) -> None:
-    space = INDICES[family][1]
+    space = SPACES[family][1]
     plan = [(mode, 215, y, 40) for mode in range(12) for y in (80, -80)]
     places, refused = await perform(family, plan, space)
     assert all(inside(space, place) for place in places)
@@ -218,7 +217,7 @@ async def test_without_a_workspace_the_same_motions_leave_it(family: str) -> Non
 @pytest.mark.parametrize("direction", ["y-", "y+", "j1-"])
 @virtual
 async def test_a_jog_is_stopped_before_the_edge(family: str, direction: str) -> None:
-    space = INDICES[family][1]
+    space = SPACES[family][1]
     async with standing(family, space) as (sim, arm), traced(sim) as places:
         with pytest.raises(MotionStopped, match="would have come"):
             await arm.jog(direction, 20)
@@ -240,7 +239,7 @@ async def test_a_raw_jog_without_an_end_is_refused(family: str) -> None:
         "mycobot280": (mycobot.JOG_COORD, mycobot.JogAxis(1, mycobot.Direction.UP, 50)),
         "ultraarm": (ultraarm.JOG_COORD, ultraarm.JogMove(1, ultraarm.JogDirection.POSITIVE, 50)),
     }[family]
-    async with standing(family, INDICES[family][1]) as (sim, arm):
+    async with standing(family, SPACES[family][1]) as (sim, arm):
         before = true_place(sim)
         with pytest.raises(ValueError, match="workspace"):
             await arm.request(*row)
@@ -264,15 +263,17 @@ RAW: dict[str, tuple[Any, Any]] = {
 @pytest.mark.parametrize("family", list(MODES))
 @virtual
 async def test_whatever_puts_it_a_target_outside_is_refused_before_anything_is_sent(family: str) -> None:
-    space = INDICES[family][1]
+    space = SPACES[family][1]
     x = RAW[family][1].coords[0] if family == "mycobot280" else RAW[family][1].x
     async with standing(family, space) as (sim, arm):
         executed = count(sim)
-        for call in (
-            lambda: arm.move_to(x, 0, 200 if family == "mycobot280" else 50, *(DOWN if family == "mycobot280" else ())),
+        rest = (0, 200, *DOWN) if family == "mycobot280" else (0, 50)
+        calls: list[Callable[[], Any]] = [
+            lambda: arm.move_to(x, *rest),
             lambda: arm.queue.put(*RAW[family]),
             lambda: arm.queue.stream([arm.queue.put(*RAW[family])]),
-        ):
+        ]
+        for call in calls:
             with pytest.raises(OutsideWorkspace, match=rf"the target \({x:g}, 0, \d+\) mm is outside of Box\(x="):
                 await call()
 
@@ -291,17 +292,17 @@ async def test_whatever_puts_it_a_target_outside_is_refused_before_anything_is_s
 async def test_a_batch_is_looked_at_as_a_whole(family: str) -> None:
     make, modes = MODES[family]
     way = modes.index("MOVL_XYZ") if family == "magician" else modes.index("to")
-    async with standing(family, INDICES[family][1]) as (sim, arm):
+    async with standing(family, SPACES[family][1]) as (sim, arm):
         executed = count(sim)
         with pytest.raises(OutsideWorkspace, match=r"the way to .* through .*, which is forbidden"):
             async with arm.queue.batch() as batch:
-                first = make(modes[way], 200, -60, 50)(batch)
+                first: Any = make(modes[way], 200, -60, 50)(batch)
                 make(modes[way], 200, 80, 50)(batch)
 
         await asyncio.sleep(1)
         assert count(sim) == executed
         with pytest.raises(MotionStopped, match="not sent"):
-            await first  # type: ignore[misc]
+            await first
 
 
 @virtual
@@ -344,15 +345,15 @@ async def test_an_arm_that_stands_outside_may_come_back_and_go_no_further(family
     way = "MOVL_XYZ" if family == "magician" else "to"
     async with standing(family, None) as (sim, arm):
         await make(way, 200, -140, 50)(arm)
-        url, kind = sim.url, INDICES[family][0]
-        assert not inside(INDICES[family][1], true_place(sim))
+        url, kind = sim.url, SPACES[family][0]
+        assert not inside(SPACES[family][1], true_place(sim))
         options = {"model": family} if family == "mycobot280" else {}
-        async with kind.connect(url, workspace=INDICES[family][1], **options) as kept:  # type: ignore[attr-defined]
+        async with kind.connect(url, workspace=SPACES[family][1], **options) as kept:  # type: ignore[attr-defined]
             with pytest.raises(OutsideWorkspace):
                 await make(way, 200, -145, 50)(kept)
 
             await make(way, 200, -100, 50)(kept)
-            assert inside(INDICES[family][1], true_place(sim))
+            assert inside(SPACES[family][1], true_place(sim))
 
 
 @virtual
