@@ -409,6 +409,17 @@ async def test_what_waits_behind_a_withdrawn_motion_is_not_sent() -> None:
 
 
 @virtual
+async def test_joints_are_looked_at_with_the_end_effector_that_the_arm_has() -> None:
+    async with standing("magician", SPACE) as (_, arm):
+        joints = arm.kinematics.inverse(230, -100, 90, 0)
+        await arm.move_joints(*joints)
+        await arm.move_to(180, -80, 90)
+        await (await arm.queue.put(c.SET_END_EFFECTOR_PARAMS, c.EndEffectorParams(159.7)))
+        with pytest.raises(OutsideWorkspace, match="the target"):
+            await arm.move_joints(*joints)
+
+
+@virtual
 async def test_a_stored_program_is_looked_at() -> None:
     async with standing("magician", SPACE) as (_, arm):
         with pytest.raises(OutsideWorkspace):

@@ -332,13 +332,15 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
             check_target(self.kinematics, value)
 
         if self._executor.keeper:
-            self._executor.keeper.check_target(self.kinematics, value)
+            self._executor.keeper.check_target(value)
 
     async def _stand(self) -> Stand:
         """Where the arm stands, for what keeps it in its workspace."""
-        pose = await self._executor.status.ask(c.GET_POSE)
+        ask = self._executor.status.ask
+        pose, bias = await ask(c.GET_POSE), await ask(c.GET_END_EFFECTOR_PARAMS)
+        kinematics = replace(self.kinematics, x_bias=bias.x_bias, y_bias=bias.y_bias, z_bias=bias.z_bias)
         known = not self.queue.leads_anywhere
-        return Stand(self.kinematics, Joints(pose.j1, pose.j2, pose.j3, pose.j4) if known else None)
+        return Stand(kinematics, Joints(pose.j1, pose.j2, pose.j3, pose.j4) if known else None)
 
     def _kept(self, direction: Jog) -> AbstractAsyncContextManager[None]:
         """While this is entered, a jog is ended before it leaves the workspace."""

@@ -18,7 +18,7 @@ from dobot_async.magician import commands as c
 from dobot_async.magician.goals import Goal, follow
 from dobot_async.magician.kinematics import Joints, Kinematics, Unreachable
 from dobot_async.magician.paths import Lift, way_of
-from dobot_async.magician.reach import is_relative
+from dobot_async.magician.reach import ANGLES, is_relative
 from dobot_async.wire import Command
 
 __all__ = ["MagicianKeeper", "Stand", "check_jog"]
@@ -67,11 +67,11 @@ class MagicianKeeper(Keeper[Stand]):
         self._stand = stand
         self._ask: Callable[[Command[None, Any]], Awaitable[Any]] = ask
 
-    def check_target(self, kinematics: Kinematics, value: Any) -> None:
-        """Raise ValueError for a command whose target is outside wherever it begins, and for a jog without an end."""
+    def check_target(self, value: Any) -> None:
+        """Raise ValueError for what leads to a place outside, whatever the tool is, and for a jog without an end."""
         check_jog(value)
-        if isinstance(value, MOTIONS):
-            self._check_places(Goal(kinematics), value)
+        if isinstance(value, MOTIONS) and getattr(value, "ptp_mode", None) not in ANGLES:
+            self._check_places(Goal(Kinematics()), value)
 
     def concerns(self, entry: Entry) -> bool:
         """Return whether a command moves the arm, or changes what ways are."""
