@@ -28,6 +28,8 @@ HOMES = {
     "fleet.fleet": ("Fleet",),
     "_core.link.link": ("Link",),
     "_core.queue.motion": ("Motion",),
+    "_core.util.shapes": ("Box", "Cylinder"),
+    "_core.util.workspace": ("OutsideWorkspace", "Workspace"),
     "transports": ("open_transport",),
     "wire": ("Command",),
 }

@@ -2,6 +2,8 @@
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.queue.motion import Motion
+from dobot_async._core.util.shapes import Box, Cylinder
+from dobot_async._core.util.workspace import OutsideWorkspace, Workspace
 from dobot_async.arms.base import Arm
 from dobot_async.arms.info import DeviceInfo
 from dobot_async.contract import LinkState, LinkStats, Unexpected
@@ -52,6 +54,7 @@ __all__ = [
     "Alarm",
     "Arm",
     "ArmAlarm",
+    "Box",
     "CobotAlarm",
     "CobotInfo",
     "CobotModel",
@@ -63,6 +66,7 @@ __all__ = [
     "ConnectFailed",
     "ConnectionLost",
     "Coords",
+    "Cylinder",
     "DeviceInfo",
     "DiscoveryProblem",
     "DobotError",
@@ -88,6 +92,7 @@ __all__ = [
     "MotionUnknown",
     "MoveMode",
     "MyCobot",
+    "OutsideWorkspace",
     "PTPMode",
     "Pen",
     "PinMode",
@@ -106,6 +111,7 @@ __all__ = [
     "Unexpected",
     "Unreachable",
     "UnsupportedError",
+    "Workspace",
     "discover",
     "open_transport",
 ]

@@ -12,12 +12,12 @@ from contextlib import asynccontextmanager
 from typing import Any, Generic, Literal, Self, TypeVar
 
 from dobot_async._core.queue.epoch import Epoch
+from dobot_async._core.util.shapes import Shape
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.barriers import Barriers
 from dobot_async.fleet.claims import Party
 from dobot_async.fleet.seat import Member, Seat, tell_to_stop
-from dobot_async.fleet.shapes import Shape
 from dobot_async.fleet.work import ended, named, on_the_way_out
 from dobot_async.fleet.zones import Zones
 

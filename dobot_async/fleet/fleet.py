@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar, cast, overload
 
 from dobot_async._core.util.arguments import check_timeout
+from dobot_async._core.util.shapes import Shape
 from dobot_async._core.util.tasks import STAYING
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
 from dobot_async.fleet.cell import read_cell
@@ -26,7 +27,6 @@ from dobot_async.fleet.crew import Crew, OnFailure
 from dobot_async.fleet.families import AnyArm
 from dobot_async.fleet.frames import BaseFrame, Place
 from dobot_async.fleet.seat import Member, Seat, tell_to_stop
-from dobot_async.fleet.shapes import Shape
 from dobot_async.fleet.together import Launch, Together, abandon
 from dobot_async.fleet.work import all_of, named, side_by_side
 from dobot_async.fleet.zones import Program, Run, here, running

@@ -29,9 +29,9 @@ from dobot_async.fleet.claims import Claim, Party
 from dobot_async.fleet.course import Course, Step
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.limits import Limits
-from dobot_async.fleet.paths import STEP
 from dobot_async.fleet.planner import Planner, Region, Stance
 from dobot_async.fleet.zones import Zones, here
+from dobot_async.magician.paths import STEP
 
 __all__ = ["Guard", "Mode"]
 

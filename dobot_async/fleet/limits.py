@@ -10,10 +10,10 @@ import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 
+from dobot_async._core.util.shapes import Box
 from dobot_async.errors import DobotError
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.planner import XYZ
-from dobot_async.fleet.shapes import Box
 
 __all__ = ["Limits"]
 

@@ -18,10 +18,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol, TypeVar
 
-from dobot_async.fleet.paths import STEP, Lift, Way, reach_of, way_of
 from dobot_async.fleet.planner import XYZ, Discs, Plan, Points, Region
 from dobot_async.magician import commands as c
 from dobot_async.magician.kinematics import Joints, Kinematics
+from dobot_async.magician.paths import STEP, Lift, Way, reach_of, way_of
 from dobot_async.magician.reach import destination
 from dobot_async.wire import Command
 

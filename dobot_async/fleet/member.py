@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
+from dobot_async._core.util.shapes import Box
 from dobot_async.fleet.families import family_of
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.guard import Mode
-from dobot_async.fleet.shapes import Box
 
 __all__ = ["Member"]
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from weakref import WeakSet
 
 from dobot_async._core.queue.epoch import Epoch
+from dobot_async._core.util.shapes import Shape
 from dobot_async.errors import DobotError, ReplyTimeout, another
 from dobot_async.fleet.claims import Claim, Claims, Party
-from dobot_async.fleet.shapes import Shape
 
 __all__ = ["Program", "Run", "Zones", "here", "running"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Coroutine
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
@@ -12,7 +12,10 @@ from typing import Any, Literal, Self, TypeVar
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.util.arguments import check_timeout
+from dobot_async._core.util.shapes import Box, Cylinder
+from dobot_async._core.util.workspace import Workspace, workspace_of
 from dobot_async.arms.info import DeviceInfo
+from dobot_async.arms.keeping import kept_inside
 from dobot_async.arms.session import arm_session, check_options, open_in_time, run_owned
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped
 from dobot_async.magician import commands as c
@@ -24,7 +27,8 @@ from dobot_async.magician.executor import MagicianExecutor
 from dobot_async.magician.goals import Need, Plan
 from dobot_async.magician.hand import Led
 from dobot_async.magician.jogs import Jog
-from dobot_async.magician.kinematics import Kinematics
+from dobot_async.magician.keeping import MagicianKeeper, Stand, check_jog
+from dobot_async.magician.kinematics import Joints, Kinematics
 from dobot_async.magician.queue import MagicianQueue
 from dobot_async.magician.ranges import check_ranges
 from dobot_async.magician.reach import check_reach as check_target
@@ -76,12 +80,16 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
         window: int,
         check_reach: bool,
         fresh: bool = False,
+        workspace: Workspace | None = None,
     ) -> None:
         self.link = link
         self.wifi = WiFi(link)
         self._check_reach = check_reach
         self._fresh = fresh
         self._executor = MagicianExecutor(link, window, self._check)
+        if workspace:
+            self._executor.keeper = MagicianKeeper(workspace, self._stand, self._executor.status.ask)
+
         self.queue = MagicianQueue(self._executor)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
 
@@ -99,6 +107,7 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
         check_reach: bool = False,
         reconnect: bool = False,
         reply_timeout: float | tuple[float, float] = (0.02, 0.5),
+        workspace: Workspace | Box | Cylinder | None = None,
     ) -> AsyncIterator[Self]:
         """Connects to an arm for the length of a block.
 
@@ -118,12 +127,16 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
                 timeout; Motions resolve if it is still the same run of the arm, else they raise MotionUnknown.
             reply_timeout: Seconds without an answer after which a request is sent again: the least and the most that it
                 may adapt itself to, or one fixed value.
+            workspace: Where the tool may be, in mm and the arm's own coordinates: a `Workspace`, or a Box or Cylinder
+                that is allowed. Targets, and ways as far as they are known, raise OutsideWorkspace, a ValueError,
+                before anything is sent; docs/workspace.md says what is looked at.
 
         Raises:
             ValueError: The URL or an argument is wrong.
             ConnectFailed: No arm answered; the message says what to check.
         """
         timeout = check_options(queue, on_error, timeout, reply_timeout)
+        kept = workspace_of(workspace)
         if not window >= 1:
             raise ValueError(f"window must be at least 1, not {window!r}")
 
@@ -147,6 +160,7 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
                 window=min(window, transport.window),
                 check_reach=check_reach,
                 fresh=control and queue == "fresh",
+                workspace=kept,
             )
 
         async with arm_session(url, timeout, reopen, build, stop_on_error=control and on_error == "stop") as arm:
@@ -176,6 +190,9 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
             raise ValueError(f"{command.name} goes through the queue: await arm.queue.put(...)")
 
         check_ranges(value)
+        if self._executor.keeper:
+            check_jog(value)
+
         request = self.link.request(command, value, timeout=timeout)
         return await (self.queue.beside(request) if command.moves else request)
 
@@ -313,6 +330,26 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
         check_ranges(value)
         if self._check_reach:
             check_target(self.kinematics, value)
+
+        if self._executor.keeper:
+            self._executor.keeper.check_target(value)
+
+    async def _stand(self) -> Stand:
+        """Where the arm stands, for what keeps it in its workspace."""
+        ask = self._executor.status.ask
+        pose, bias = await ask(c.GET_POSE), await ask(c.GET_END_EFFECTOR_PARAMS)
+        kinematics = replace(self.kinematics, x_bias=bias.x_bias, y_bias=bias.y_bias, z_bias=bias.z_bias)
+        known = not self.queue.leads_anywhere
+        return Stand(kinematics, Joints(pose.j1, pose.j2, pose.j3, pose.j4) if known else None)
+
+    def _kept(self, direction: Jog) -> AbstractAsyncContextManager[None]:
+        """While this is entered, a jog is ended before it leaves the workspace."""
+        keeper = self._executor.keeper
+        return kept_inside(keeper.workspace if keeper else None, self._place, self._stop_jog, direction.word)
+
+    async def _place(self) -> tuple[float, float, float]:
+        pose = await self.get_pose()
+        return pose.x, pose.y, pose.z
 
 
 def silent(link: Link[frame.Frame]) -> ConnectFailed:

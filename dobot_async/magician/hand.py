@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext, suppress
 from typing import Any
 
 import anyio
@@ -29,6 +29,10 @@ class Led:
 
     link: Link[Any]
     queue: MagicianQueue
+
+    def _kept(self, direction: Jog) -> AbstractAsyncContextManager[None]:  # noqa: ARG002 - where it may go anywhere
+        """While this is entered, a jog is ended before it leaves the workspace."""
+        return nullcontext()
 
     async def jog(self, direction: Jog | str, seconds: float) -> None:
         """Jog for a time, at the speed of the JOG parameters, then stop. Manual 2.10.4.
@@ -59,6 +63,7 @@ class Led:
             ValueError: There is no such direction, or the rail was not declared; see `set_rail`.
             ArmAlarm: The jog has ended at a limit; raised when the block ends.
             CommandRejected: The arm executes what is queued, and would not hear the jog.
+            MotionStopped: It was stopped before the tool left the workspace of `connect`; raised when the block ends.
         """
         direction, epoch = Jog.of(direction), self.queue.epoch
         command = c.JOGCmd(*direction.value)
@@ -73,7 +78,8 @@ class Led:
         before = await self._faults()
         async with self.link.cleanup.at_end(self._stop_jog, "the end of the jog"):
             await self.queue.beside(self.link.request(c.SET_JOG_CMD, command), epoch)
-            yield
+            async with self._kept(direction):
+                yield
 
         check_limits(direction, before, await self._faults())
 

@@ -92,6 +92,11 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
         if self.inherited and motions:
             self._own = self._own or motions[-1]
 
+    @property
+    def leads_anywhere(self) -> bool:
+        """Whether what an earlier program has left in the arm's queue may move it still."""
+        return self.inherited and not (self._own and self._own.ended and self._own.exception() is None)
+
     def goal(self, *more: Motion) -> Goal:
         """Return where the arm will be behind all that is queued, and behind some more; asks nobody."""
         goal = Goal(self.kinematics)
@@ -113,7 +118,7 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
             if list(self._before()):
                 return self.goal()
 
-            if self.inherited and not (self._own and self._own.ended and self._own.exception() is None):
+            if self.leads_anywhere:
                 raise ValueError(
                     'connected with queue="keep", it is not known what lies in the arm\'s queue, nor where that leads: '
                     "say x, y, z and r, or await a motion of your own first"
@@ -183,6 +188,9 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
         program, epoch = Program(self), self.epoch
         yield program
         await self.declared.check([motion.entry.value for motion in program.motions], queued=True)
+        if self._arm.keeper:
+            await self._arm.keeper.admit_stored(program.motions, self.kinematics)
+
         outbox = Outbox(lambda _: None)
         outbox.add(program.motions)
         async with self._arm.cleanup.at_end(self._arm.end_download, "the end of the download"):

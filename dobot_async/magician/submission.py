@@ -23,6 +23,7 @@ from dobot_async.magician import commands as c
 from dobot_async.magician.alarms import Alarm, faults
 from dobot_async.magician.datagrams import DatagramGuard, Surplus
 from dobot_async.magician.frame import Frame
+from dobot_async.magician.keeping import MagicianKeeper
 from dobot_async.magician.ledger import QueueLedger, Resolution, UnackedCommand
 from dobot_async.magician.reach import is_relative
 from dobot_async.magician.space import QueueSpace
@@ -45,7 +46,10 @@ class Submission:
         status: What the arm says of itself.
         ledger: What it has taken.
         space: How much room it has.
+        keeper: See `Executor`.
     """
+
+    keeper: MagicianKeeper | None = None
 
     def __init__(self, link: Link[Frame], window: int, check: Callable[[Any], None]) -> None:
         self.cleanup = link.cleanup

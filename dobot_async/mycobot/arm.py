@@ -14,6 +14,9 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.queue.host import HostExecutor
 from dobot_async._core.util.arguments import check_duration, check_timeout
+from dobot_async._core.util.shapes import Box, Cylinder
+from dobot_async._core.util.workspace import Workspace, workspace_of
+from dobot_async.arms.keeping import kept_inside
 from dobot_async.arms.session import arm_session, check_options, run_owned
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
 from dobot_async.mycobot import commands as c
@@ -22,6 +25,7 @@ from dobot_async.mycobot.channel import Channel
 from dobot_async.mycobot.executor import CobotRunner, Tolerance
 from dobot_async.mycobot.gripper import GRIPPER
 from dobot_async.mycobot.jog import jog_command, jogging
+from dobot_async.mycobot.keeping import CobotKeeper
 from dobot_async.mycobot.models import DEFAULT, CobotModel, Range, model_of
 from dobot_async.mycobot.opening import BARRIERS, GAP, greet, opened, reply_times, with_baud
 from dobot_async.mycobot.queue import CobotQueue
@@ -58,13 +62,17 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         tolerance: Tolerance,
         fresh: bool = False,
         patience: float = 0.0,
+        workspace: Workspace | None = None,
     ) -> None:
         self.link = link
         self._model = model
         self._fresh = fresh
         self._channel = Channel(link, model, acknowledges=acknowledges, patience=patience)
-        self._runner = CobotRunner(self._channel, tolerance)
+        keeper = CobotKeeper(workspace, self._channel) if workspace else None
+        self._workspace = workspace
+        self._runner = CobotRunner(self._channel, tolerance, keeper)
         self._executor = HostExecutor(self._runner, link.cleanup)
+        self._executor.keeper = keeper
         self.queue = CobotQueue(self._executor, model)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
         super().__init__(self._channel, self._runner)
@@ -91,6 +99,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         tolerance: Tolerance = TOLERANCE,
         limits: Mapping[str, Range] | None = None,
         gap: float = GAP,
+        workspace: Workspace | Box | Cylinder | None = None,
     ) -> AsyncIterator[Self]:
         """Connect to an arm for the length of a block.
 
@@ -115,6 +124,10 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
             limits: Ranges of your own beside the model's, by joint and axis: `{"j2": (-90, 90), "z": (20, 400)}`.
                 Degrees and mm; what a motion names is checked before it is sent.
             gap: Seconds between two frames.
+            workspace: Where the tool may be, in mm and the coordinates that the arm tells: a `Workspace`, or a Box or
+                Cylinder that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is
+                sent, or CommandRejected where it shows when its turn comes. Motions given in joints are not looked at;
+                see docs/workspace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -126,6 +139,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         reply_timeout = reply_times(url) if reply_timeout is None else reply_timeout
         timeout = check_options(queue, on_error, timeout, reply_timeout)
         gap = check_duration(gap, "gap")
+        kept = workspace_of(workspace)
         if len(tolerance) != 2 or not min(check_duration(each, "tolerance") for each in tolerance) > 0:
             raise ValueError(f"tolerance must be degrees and mm, both above 0, not {tolerance!r}")
 
@@ -151,6 +165,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
             tolerance=tolerance,
             fresh=control and queue == "fresh",
             patience=floor,
+            workspace=kept,
         )
         async with arm_session(
             with_baud(url, arm_model.baud),
@@ -184,6 +199,9 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         """
         if command.queueing is Queueing.ALWAYS:
             raise ValueError(f"{command.name} goes through the queue: await arm.queue.put(...)")
+
+        if self._workspace and command.moves:
+            raise ValueError(f"{command.name} has no end, and can leave the workspace: use jog() or jogging()")
 
         if not command.write:
             return await self._channel.ask(command, value, timeout=timeout)
@@ -265,13 +283,17 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         Raises:
             ValueError: There is no such direction; the message lists those of this model.
             CommandRejected: The arm did not move, or motions of the queue are under way.
-            MotionStopped: It came to rest before the end, at a limit or at the end of its reach.
+            MotionStopped: It came to rest before the end, at a limit or at the end of its reach; or it was stopped
+                before the tool left the workspace of `connect`.
             ArmAlarm: A joint keeps it from moving.
             ReplyTimeout: The arm does not answer when it is to begin, or when it is to stop.
         """
         jog = jog_command(self._model, direction, speed)
         self.link.frame(self._model.row(jog[0]), jog[1])
-        async with jogging(self._channel, self._runner, direction, jog, self.queue):
+        async with (
+            jogging(self._channel, self._runner, direction, jog, self.queue),
+            kept_inside(self._workspace, self._place, self._runner.stop, direction),
+        ):
             yield
 
     async def jog_stop(self) -> None:
@@ -303,6 +325,11 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
                 raise
 
             raise ReplyTimeout(f"the gripper was not seen to be done within {timeout:.3g} s; it may go on") from None
+
+    async def _place(self) -> tuple[float, ...]:
+        """Where the tool is."""
+        coords = await self._channel.ask(c.GET_COORDS, None)
+        return tuple(coords)[:3]
 
     async def greet(self, timeout: float) -> None:
         """Prove that an arm answers, and as its model does, and stop it if that was asked for; for `connect`."""

@@ -18,12 +18,14 @@ from functools import partial
 from typing import Any, TypeVar
 
 from dobot_async._core.queue.executor import Entry
+from dobot_async._core.util.workspace import OutsideWorkspace
 from dobot_async.errors import ArmAlarm, CommandRejected, MotionStopped, ReplyTimeout
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.alarms import SERVO_LOSS, CobotAlarm, joint_alarms, motion_alarm
 from dobot_async.mycobot.channel import SILENCE, Channel
 from dobot_async.mycobot.goals import GOALS, Goals
 from dobot_async.mycobot.gripper import GRIPPER, run_gripper
+from dobot_async.mycobot.keeping import CobotKeeper
 from dobot_async.mycobot.stopping import stop_until_still
 from dobot_async.mycobot.targets import MOVE_PARTLY, SUCTION, WAIT
 from dobot_async.mycobot.watch import LOOKS, Goal, Verdict, Watch, cannot_read_servos
@@ -60,8 +62,9 @@ class Reached:
 class CobotRunner:
     """What does one command after the other; see `MotionRunner`."""
 
-    def __init__(self, channel: Channel, tolerance: Tolerance) -> None:
+    def __init__(self, channel: Channel, tolerance: Tolerance, keeper: CobotKeeper | None = None) -> None:
         self._channel = channel
+        self._keeper = keeper
         self._goals = Goals(channel, *tolerance)
         self._loop = asyncio.get_running_loop()
         self._paused = False
@@ -79,7 +82,11 @@ class CobotRunner:
             self._channel.link.frame(model.row(c.SEND_COORDS), whole, queued=True)
 
         model.check(command, value)
-        return Entry(command, value, frame)
+        entry = Entry(command, value, frame)
+        if self._keeper:
+            self._keeper.check(entry)
+
+        return entry
 
     async def run(self, entry: Entry) -> None:
         """Do one command, and return when it is done; see `MotionRunner`."""
@@ -156,6 +163,12 @@ class CobotRunner:
         frames = self._channel.frames
         if entry.command is MOVE_PARTLY:
             entry = await self._whole(entry, reached)
+
+        if self._keeper:
+            try:
+                await self._keeper.check_here(entry)
+            except OutsideWorkspace as error:
+                raise CommandRejected(f"the motion was not sent: {error}") from None
 
         try:
             goal = await GOALS[entry.command](self._goals, entry.value)

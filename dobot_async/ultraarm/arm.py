@@ -14,7 +14,10 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.queue.host import HostExecutor
 from dobot_async._core.util.arguments import check_choice, check_duration, check_timeout
+from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.tasks import STAYING
+from dobot_async._core.util.workspace import Workspace, workspace_of
+from dobot_async.arms.keeping import kept_inside
 from dobot_async.arms.session import arm_session, check_options, run_owned
 from dobot_async.errors import CommandRejected, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.transports import Transport
@@ -22,10 +25,12 @@ from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.frame import BARRIERS, Frame, Parser, encode
 from dobot_async.ultraarm.gcode import GCodeRun, Source, parse_gcode
 from dobot_async.ultraarm.jog import Jogger, UltraArmJog, direction_of
+from dobot_async.ultraarm.keeping import Stand
 from dobot_async.ultraarm.opening import opened, silent
 from dobot_async.ultraarm.queue import UltraArmQueue
 from dobot_async.ultraarm.readings import Readings
 from dobot_async.ultraarm.runner import UltraArmRunner
+from dobot_async.ultraarm.state import JOGS
 from dobot_async.ultraarm.tools import darken
 from dobot_async.ultraarm.verbs import SPEED, Pump, Verbs, check_speed
 from dobot_async.wire import Command, Queueing
@@ -56,13 +61,18 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
         tolerance: float,
         home_switches: tuple[int, int, int] | None,
         on_stop: Literal["release", "finish"],
+        workspace: Workspace | None = None,
     ) -> None:
         self.link = link
         self.limits = limits
         self.pump = pump
-        self._runner = UltraArmRunner(link, limits, tolerance=tolerance, home_switches=home_switches, on_stop=on_stop)
+        self._workspace = workspace
+        self._runner = UltraArmRunner(
+            link, limits, tolerance=tolerance, home_switches=home_switches, on_stop=on_stop, workspace=workspace
+        )
         super().__init__(self._runner)
         self._executor = HostExecutor(self._runner, link.cleanup)
+        self._executor.keeper = self._runner.keeper
         self._jogger = Jogger(self._runner, link.cleanup)
         self.queue = UltraArmQueue(self._executor, pump)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
@@ -84,6 +94,7 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
         tolerance: float = 1.0,
         home_switches: tuple[int, int, int] | None = (1, 1, 1),
         on_stop: Literal["release", "finish"] = "release",
+        workspace: Workspace | Box | Cylinder | None = None,
     ) -> AsyncIterator[Self]:
         """Connect to an arm for the length of a block.
 
@@ -109,6 +120,10 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
                 and then `home` is done when something has moved.
             on_stop: What to do where M15 does not end a motion: "release" takes the power off the motors, after which
                 the arm has to be powered on and homed; "finish" lets it finish what is in its queue.
+            workspace: Where the tool may be, in mm and the arm's own coordinates: a `Workspace`, or a Box or Cylinder
+                that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is sent, or
+                CommandRejected where it shows when its turn comes. Motions given in joints are not looked at; see
+                docs/workspace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -124,6 +139,7 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
         if home_switches is not None and (len(home_switches) != 3 or not {*home_switches} <= {0, 1}):
             raise ValueError(f"home_switches must be three of 0 and 1, or None, not {home_switches!r}")
 
+        kept = workspace_of(workspace)
         floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
         reopen = partial(opened, timeout=timeout)
 
@@ -139,7 +155,13 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
                 reopen=partial(reopen, found) if reconnect else None,
             )
             return cls(
-                link, limits=limits, pump=pump, tolerance=tolerance, home_switches=home_switches, on_stop=on_stop
+                link,
+                limits=limits,
+                pump=pump,
+                tolerance=tolerance,
+                home_switches=home_switches,
+                on_stop=on_stop,
+                workspace=kept,
             )
 
         async with arm_session(url, timeout, reopen, build, stop_on_error=control and on_error == "stop") as arm:
@@ -167,6 +189,12 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
             raise ValueError(f"{command.name} goes through the queue: await arm.queue.put(...)")
 
         self.limits.check(value)
+        if self._runner.keeper:
+            if command in JOGS:
+                raise ValueError(f"{command.name} has no end, and can leave the workspace: use jog() or jogging()")
+
+            self._runner.keeper.lead(command, value, Stand())
+
         self._runner.state.check(command)
         return await self._runner.ask(command, value, timeout=timeout)
 
@@ -236,6 +264,7 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
         Raises:
             CommandRejected: A motion or a jog goes on, or the motors have no power, or the arm has lost its place.
             ArmAlarm: The arm did not set out, or had come to the end of its way before the block ended.
+            MotionStopped: It was stopped before the tool left the workspace of `connect`.
             ReplyTimeout: The arm does not acknowledge that it is to begin, or is not seen to stand.
         """
         is_joint, axis, way = direction_of(direction).value
@@ -244,7 +273,10 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
         if self.queue.pending:
             raise CommandRejected("motions are pending: a jog can begin when they are done, or stopped")
 
-        async with self._jogger.jogging(command, value, self.queue):
+        async with (
+            self._jogger.jogging(command, value, self.queue),
+            kept_inside(self._workspace, self._place, self._jogger.end, direction_of(direction).word),
+        ):
             yield
 
     async def jog_stop(self, *, timeout: float = STAYING) -> None:
@@ -285,7 +317,7 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
             ValueError: Lines are wrong, or lead beyond the limits; the message has each with its number.
             OSError: The file cannot be read.
         """
-        steps = parse_gcode(source, self.limits)
+        steps = parse_gcode(source, self.limits, self._runner.keeper)
         return GCodeRun(
             self.queue,
             self.link.cleanup,
@@ -298,6 +330,11 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, None]:
         """Do a command through the queue, and return when it is done."""
         return self._perform(command, value, timeout)
+
+    async def _place(self) -> tuple[float, float, float]:
+        """Where the tool is."""
+        coords = await self._runner.ask(c.GET_COORDS, None)
+        return coords.x, coords.y, coords.z
 
     async def greet(self, timeout: float) -> None:
         """Prove that an arm answers; for `connect`."""

@@ -35,6 +35,7 @@ from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.frame import split_words
 from dobot_async.ultraarm.gcode_text import bare
 from dobot_async.ultraarm.goals import AXES, INCREMENTS
+from dobot_async.ultraarm.keeping import Stand, UltraArmKeeper
 from dobot_async.ultraarm.layouts import Words
 from dobot_async.wire import Command, Queueing
 
@@ -51,19 +52,22 @@ DWELL = Words(c.Dwell)
 MODES = {c.ABSOLUTE: False, c.RELATIVE: True}
 
 
-def parse_gcode(source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS) -> tuple[GCodeLine, ...]:
+def parse_gcode(
+    source: Source, limits: c.UltraArmLimits = c.MANUAL_LIMITS, keeper: UltraArmKeeper | None = None
+) -> tuple[GCodeLine, ...]:
     """Return a program's commands; do no more than to read the file.
 
     Args:
         source: A file's path, or lines.
         limits: What the arm may be told. Of increments the goal is looked at, where it is known from where.
+        keeper: What keeps the arm in its workspace, from the first place on that is known.
 
     Raises:
         ProgramError: Lines are wrong; the message has each with its number.
         ValueError: The file is not UTF-8 text.
         OSError: The file cannot be read.
     """
-    reader = Reader(limits)
+    reader = Reader(limits, keeper)
     found: list[GCodeLine] = []
     wrong = []
     for number, written in enumerate(lines_of(source), 1):
@@ -97,8 +101,10 @@ class Reader:
         ended: Whether the program has said that it ends.
     """
 
-    def __init__(self, limits: c.UltraArmLimits) -> None:
+    def __init__(self, limits: c.UltraArmLimits, keeper: UltraArmKeeper | None = None) -> None:
         self.ended = False
+        self._keeper = keeper
+        self._stand = Stand()
         self._limits = limits
         self._relative = False
         self._motion = ""  # what a line of axes alone goes on with
@@ -166,6 +172,9 @@ class Reader:
             value = replace(value, f=self._speed)
 
         command.request.encode(value)
+        if self._keeper:
+            self._stand = self._keeper.lead(command, value, self._stand)
+
         if command in INCREMENTS:
             self._move(value)
         else:

@@ -45,8 +45,13 @@ class UltraArmJog(Enum):
     J3_PLUS = (True, 3, c.JogDirection.POSITIVE)
     J3_MINUS = (True, 3, c.JogDirection.NEGATIVE)
 
+    @property
+    def word(self) -> str:
+        """The word for it: "x+", "j2-"."""
+        return self.name.lower().replace("_plus", "+").replace("_minus", "-")
 
-WORDS = {each.name.lower().replace("_plus", "+").replace("_minus", "-"): each for each in UltraArmJog}
+
+WORDS = {each.word: each for each in UltraArmJog}
 
 
 def direction_of(direction: UltraArmJog | str) -> UltraArmJog:

@@ -20,12 +20,14 @@ from typing import Any, Literal, TypeVar
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.queue.executor import Entry, alarmed
+from dobot_async._core.util.workspace import OutsideWorkspace, Workspace
 from dobot_async.errors import CommandRejected, MotionUnknown
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.answers import Receipt, Status
 from dobot_async.ultraarm.channel import Channel
 from dobot_async.ultraarm.frame import Frame
 from dobot_async.ultraarm.goals import INCREMENTS, Fault, Goal, goal_of, summed
+from dobot_async.ultraarm.keeping import Stand, UltraArmKeeper
 from dobot_async.ultraarm.state import ArmState
 from dobot_async.ultraarm.status import RESTS, STATUS_AND_ANGLES, StatusPoller
 from dobot_async.ultraarm.stopper import Stopper
@@ -49,6 +51,7 @@ class UltraArmRunner:
         tolerance: By how many mm or degrees it may miss a goal.
         home_switches: What its home switches read at home; None does not look.
         on_stop: What to do where M15 does not end a motion.
+        workspace: Where the tool may be.
 
     Attributes:
         channel: How it is asked.
@@ -57,6 +60,7 @@ class UltraArmRunner:
         stopper: What stops it.
         busy: Whether a command is being done.
         jogging: Whether a jog goes on.
+        keeper: What keeps the arm in its workspace.
     """
 
     def __init__(
@@ -67,8 +71,10 @@ class UltraArmRunner:
         tolerance: float,
         home_switches: tuple[int, ...] | None,
         on_stop: Literal["release", "finish"],
+        workspace: Workspace | None = None,
     ) -> None:
         self.channel = Channel(link)
+        self.keeper = UltraArmKeeper(workspace, self._stand) if workspace else None
         self.state = ArmState()
         self.status = StatusPoller(self.channel.read, lambda: link.stats)
         self.stopper = Stopper(self.status, self.state, on_stop)
@@ -125,6 +131,9 @@ class UltraArmRunner:
         frame = self._link.frame(command, value, queued=True)
         if not self._planned.increments(command):
             self._limits.check(value)
+
+        if self.keeper:
+            self.keeper.lead(command, value, Stand(relative=self._planned.relative))
 
         self._planned.check(command)
         if self.jogging and command.moves:
@@ -205,6 +214,7 @@ class UltraArmRunner:
         """Do a motion, and return when the arm was seen at its goal."""
         if command in INCREMENTS or command is c.MOVE_BY:
             command, value = await self._resolved(command, value)
+            await self._keep(command, value)
 
         if command is c.HOME:
             await self.status.poll(STATUS_AND_ANGLES)  # to see by it whether something moves
@@ -257,6 +267,20 @@ class UltraArmRunner:
             raise CommandRejected(f"the increments were not sent, for they lead beyond the limits: {error}") from None
 
         return (c.MOVE_LINE if command is c.MOVE_LINE else c.MOVE_COORDS), target
+
+    async def _keep(self, command: Command[Any, Any], value: c.CoordsMove) -> None:
+        """Raise CommandRejected for a motion that leads out of the workspace from where the arm stands."""
+        if self.keeper:
+            here = await self._stand()
+            try:
+                self.keeper.lead(command, value, replace(here, relative=False))
+            except OutsideWorkspace as error:
+                raise CommandRejected(f"the motion was not sent: {error}") from None
+
+    async def _stand(self) -> Stand:
+        """Where the arm stands, and what coordinates mean to what is done next."""
+        coords = await self.channel.read(c.GET_COORDS)
+        return Stand((coords.x, coords.y, coords.z), self.state.relative)
 
     async def _arrive(self, goal: Goal) -> Fault | None:
         """Return when the arm rests at a goal, or elsewhere: then what is wrong."""

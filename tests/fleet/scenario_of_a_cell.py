@@ -21,8 +21,8 @@ from typing import Any
 import async_solipsism
 
 from dobot_async import ConnectionLost, DobotError, Fleet, Magician, PTPMode
+from dobot_async._core.util.shapes import Shape
 from dobot_async.fleet import BaseFrame, Box, Cylinder, Member, ZoneDeadlock
-from dobot_async.fleet.shapes import Shape
 from dobot_async.simulator import Faults, Simulation, simulate
 
 __all__ = ["Figures", "Violation", "run_seed"]

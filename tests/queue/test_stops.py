@@ -11,6 +11,7 @@ import pytest
 from virtual import virtual
 
 from dobot_async._core.queue.executor import Entry, Source
+from dobot_async._core.queue.keeper import Keeper
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
@@ -37,6 +38,7 @@ class FakeExecutor:
     def __init__(self) -> None:
         self.cleanup = Cleanup("fake:")
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
+        self.keeper: Keeper[Any] | None = None
         self.taken = self.finished = 0
         self.raised: list[object] = []
         self.fails = False

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import ArmAlarm, DobotError, MotionUnknown, ReplyTimeout
 from dobot_async.wire import Command
+
+if TYPE_CHECKING:
+    from dobot_async._core.queue.keeper import Keeper
 
 __all__ = ["Entry", "Executor", "Source", "alarmed", "in_motions", "unseen"]
 
@@ -51,6 +54,10 @@ class Executor(Protocol):
 
     cleanup: Cleanup
     on_unknown: Hooks[[MotionUnknown]]
+
+    @property
+    def keeper(self) -> Keeper[Any] | None:
+        """What looks at the ways of motions before they are sent; None for an arm that may go anywhere."""
 
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
         """Return an entry for the queue.

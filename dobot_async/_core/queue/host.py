@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol, TypeVar
 
 from dobot_async._core.queue.executor import Entry, Source, unseen
+from dobot_async._core.queue.keeper import Keeper
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup, cancel_and_join
@@ -66,7 +67,10 @@ class HostExecutor:
 
     Attributes:
         on_progress: Hooks, called when a command is done or has failed.
+        keeper: See `Executor`.
     """
+
+    keeper: Keeper[Any] | None = None
 
     def __init__(self, runner: MotionRunner, cleanup: Cleanup, capacity: int = CAPACITY) -> None:
         self.cleanup = cleanup

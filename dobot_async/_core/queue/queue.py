@@ -47,6 +47,7 @@ Q = TypeVar("Q")
 S = TypeVar("S", bound=StreamStep)
 T = TypeVar("T")
 logger = logging.getLogger("dobot_async.queue")
+ELSEWHERE = MotionStopped("it was not sent: the motion before it was withdrawn, and its way would begin elsewhere")
 
 
 class MotionQueue:
@@ -66,6 +67,7 @@ class MotionQueue:
         self._writer = Writer(executor, self._outbox, self._poller, self)
         self._stopper = Stopper(executor, self)
         self._failure: DobotError | None = None
+        self._keeping = asyncio.Lock()
 
     @property
     def pending(self) -> int:
@@ -109,12 +111,13 @@ class MotionQueue:
             timeout: Seconds to wait for room.
             epoch: The epoch in which the steps that led here began; a stop since then lets nothing be sent.
         """
-        timeout, call = check_timeout(timeout), object()
+        timeout, call, epoch = check_timeout(timeout), object(), epoch or self.epoch
         for motion in motions:
             motion.call = call
 
+        await self._keep(motions)
         try:
-            (epoch or self.epoch).check()
+            epoch.check()
         except DobotError as error:
             for motion in motions:
                 motion.end(error)
@@ -131,19 +134,48 @@ class MotionQueue:
                     if motion.index is None:
                         break
         except DobotError as error:
-            self._outbox.withdraw(motions, error)
+            self._withdraw(motions, error)
             raise
         except TimeoutError:
             late = ReplyTimeout(f"the arm's queue had no room within {timeout:.3g} s")
-            self._outbox.withdraw(motions, late)
+            self._withdraw(motions, late)
             raise another(late) from None
         except asyncio.CancelledError:
-            self._outbox.withdraw(motions, WITHDRAWN)
+            self._withdraw(motions, WITHDRAWN)
             raise
 
         failed = next((motion for motion in motions if motion.index is None), None)
         if failed and (failure := failed.exception()):
             raise another(failure)
+
+    async def _keep(self, motions: Sequence[Motion]) -> None:
+        """Raise OutsideWorkspace, and send nothing, if one of several motions leads out of the arm's workspace."""
+        keeper = self._executor.keeper
+        if not keeper:
+            return
+
+        try:
+            async with self._keeping:  # nothing overtakes what has to ask first
+                await keeper.admit(motions, self._unended, self.update)
+        except BaseException as error:
+            stopped = MotionStopped(f"it was not sent: {error}") if isinstance(error, ValueError) else WITHDRAWN
+            for motion in motions:
+                motion.end(stopped)
+
+            raise
+
+    def _withdraw(self, motions: Sequence[Motion], reason: DobotError) -> None:
+        """Nobody wants these any more; nor what would go another way, behind them, than the one that was looked at."""
+        keeper, unsent = self._executor.keeper, self._outbox.unaccepted
+        self._outbox.withdraw(motions, reason)
+        if keeper:
+            gone = (each.ended and each in motions and keeper.concerns(each.entry) for each in unsent)
+            first = next((number for number, each in enumerate(gone) if each), len(unsent))
+            self._outbox.withdraw(unsent[first:], ELSEWHERE)
+
+    def _unended(self) -> list[Motion]:
+        """What has not ended, in its order."""
+        return [motion for motion in (*self._pending, *self._outbox.unaccepted) if not motion.ended]
 
     @overload
     def stream(self, steps: Steps[Coroutine[Any, Any, Motion]]) -> Stream[Motion]: ...
