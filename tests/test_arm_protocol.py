@@ -64,6 +64,22 @@ async def test_one_program_drives_an_arm_of_any_family(model: str) -> None:
 
 @each_family
 @virtual
+async def test_an_arm_of_any_family_follows_a_target(model: str) -> None:
+    kind, _ = FAMILIES[model]
+    async with simulate(model) as sim, kind.connect(sim.url) as arm:
+        typed: Arm = arm
+        await typed.home()
+        before = await typed.get_pose()
+        async with typed.following(max_speed=50) as follow:
+            for _ in range(60):
+                follow.target = (before.x, before.y, before.z - 10)
+                await asyncio.sleep(0.05)
+
+        assert (await typed.get_pose()).z < before.z - 2
+
+
+@each_family
+@virtual
 async def test_what_every_arm_tells(model: str) -> None:
     kind, _ = FAMILIES[model]
     options: dict[str, Any] = {} if model == "mycobot280" else {"homed": True}

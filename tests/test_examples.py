@@ -166,6 +166,13 @@ def check_svg_drawing(output: str) -> None:
     assert [numbers(line) for line in output.splitlines()] == [[98], [2]]
 
 
+def check_follow_target(output: str) -> None:
+    """It went on all the time, and stands at the end of the trajectory."""
+    (sent,), place = (numbers(line) for line in output.splitlines())
+    assert sent > 8
+    assert place == pytest.approx([200, 0, 40], abs=1)
+
+
 CHECKS: dict[str, Callable[[str], None]] = {
     "connect_and_read.py": check_connect_and_read,
     "pick_and_place.py": check_pick_and_place,
@@ -185,6 +192,7 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "color_sorter.py": check_color_sorter,
     "rail_pick_and_place.py": check_rail_pick_and_place,
     "svg_drawing.py": check_svg_drawing,
+    "follow_target.py": check_follow_target,
 }
 
 

@@ -1,7 +1,7 @@
 """The way of the imports, read from the source: layers know nothing of higher ones, and families not of each other.
 
-errors <- wire, util <- transports <- link <- queue <- arms <- families <- discovery <- simulator <- toolpath <- cli
-<- __main__
+errors <- wire, util <- transports <- link <- queue <- following <- arms <- families <- discovery <- simulator
+<- toolpath <- cli <- __main__
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ LAYERS = (
     ("layouts", "transports", "contract", "calibration", "grid"),
     ("_core.link", "rows"),
     ("_core.queue", "bridged", "program"),
+    ("following",),
     ("arms",),
     FAMILIES,
     ("discovery", "fleet"),

@@ -18,6 +18,7 @@ from typing import Any, Protocol, TypeVar
 from dobot_async._core.link.link import Link
 from dobot_async._core.queue.motion import Motion
 from dobot_async.arms.info import DeviceInfo
+from dobot_async.following import Follow
 from dobot_async.wire import Command
 
 __all__ = ["Arm", "ArmBatch", "ArmPose", "ArmQueue", "ArmVerbs"]
@@ -159,6 +160,10 @@ class Arm(ArmVerbs[Coroutine[Any, Any, None]], Protocol):
 
     def jogging(self, direction: str) -> AbstractAsyncContextManager[None]:
         """Jog until the block ends, however it ends."""
+
+    @property
+    def following(self) -> Callable[..., AbstractAsyncContextManager[Follow]]:
+        """Let the arm follow a target for the length of a block; takes `rate=`, `max_speed=`, `max_turn=`, `stale=`."""
 
     async def stop(self, *, timeout: float = ...) -> None:
         """Stop the arm now, ahead of everything; pending Motions raise MotionStopped."""

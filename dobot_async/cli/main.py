@@ -51,6 +51,7 @@ COMMANDS = {
     "stop": ("dobot_async.cli.commands:stop", "Stop the arm now, and empty its queue."),
     "suction": ("dobot_async.cli.commands:suction", "Switch the suction cup."),
     "write": ("dobot_async.cli.drawing:write_line", "Write a text with a pen."),
+    "teleop": ("dobot_async.cli.teleop:teleop", "Lead the arm by keys, or by targets from a pipe."),
     "wifi": ("dobot_async.cli.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
 }
 """Where each command is, and what the help says of it."""

@@ -24,6 +24,7 @@ from dobot_async.magician.alarms import Alarm, decode
 from dobot_async.magician.arguments import to_choice, to_flag
 from dobot_async.magician.declared import told_rail
 from dobot_async.magician.executor import MagicianExecutor
+from dobot_async.magician.following import MagicianFollowing
 from dobot_async.magician.goals import Need, Plan
 from dobot_async.magician.hand import Led
 from dobot_async.magician.jogs import Jog
@@ -70,6 +71,7 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
     Attributes:
         link: The connection, with its state, events and figures.
         queue: The arm's queue, with the same verbs.
+        following: Called for a block in which the arm follows a target: `async with arm.following() as follow`.
         wifi: Which network the arm joins, and whether it is in it.
     """
 
@@ -91,6 +93,7 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
             self._executor.keeper = MagicianKeeper(workspace, self._stand, self._executor.status.ask)
 
         self.queue = MagicianQueue(self._executor)
+        self.following = MagicianFollowing(link, self._executor, lambda: self.queue)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
 
     @classmethod

@@ -23,6 +23,7 @@ from dobot_async.mycobot import commands as c
 from dobot_async.mycobot import frame
 from dobot_async.mycobot.channel import Channel
 from dobot_async.mycobot.executor import CobotRunner, Tolerance
+from dobot_async.mycobot.following import CobotFollowing
 from dobot_async.mycobot.gripper import GRIPPER
 from dobot_async.mycobot.jog import jog_command, jogging
 from dobot_async.mycobot.keeping import CobotKeeper
@@ -51,6 +52,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
     Attributes:
         link: The connection, with its state, events and figures.
         queue: The queue of motions, with the same verbs. It is on this side, so it ends with the block.
+        following: Called for a block in which the arm follows a target: `async with arm.following() as follow`.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         self._executor = HostExecutor(self._runner, link.cleanup)
         self._executor.keeper = keeper
         self.queue = CobotQueue(self._executor, model)
+        self.following = CobotFollowing(self._channel, self._runner, tolerance, lambda: self.queue)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
         super().__init__(self._channel, self._runner)
 

@@ -44,6 +44,7 @@ class UltraArmQuirks:
         dwell_rests: Whether M9 says "Moving end" while the arm waits (G4).
         jog_stop: What M15 ends: "jog" alone, as the manual has it, or "all" that moves or waits.
         release: When M17 takes the power off the motors: "now", with the queue emptied, or "queued" behind the motions.
+        constant_speed: Whether M16 S0 takes the ramps away from each motion, as its name says.
     """
 
     acknowledge: Literal["size", "ok", "nothing"] = "size"
@@ -52,6 +53,7 @@ class UltraArmQuirks:
     dwell_rests: bool = False
     jog_stop: Literal["jog", "all"] = "jog"
     release: Literal["now", "queued"] = "now"
+    constant_speed: bool = False
 
 
 @dataclass(slots=True)
@@ -97,7 +99,7 @@ class SimulatedUltraArm:
             quirks: What this arm's firmware does differently.
             homed: Whether it has been home already; a real arm has not, and a `sim:` URL begins with one that has.
         """
-        self._registers = Registers(homed=homed)
+        self._registers = Registers(homed=homed, constant_speed=quirks.constant_speed)
         self.device = Device(clock, (0.0, 0.0, 0.0, 0.0), options or ULTRAARM)
         self.quirks = quirks
         self.counters = UltraArmCounters()
@@ -156,7 +158,7 @@ class SimulatedUltraArm:
     def power_cycle(self) -> None:
         """Switches it off and on: it forgets all, and stands where it stood."""
         self.device.power_cycle()
-        self._works.registers = self._registers = Registers()
+        self._works.registers = self._registers = Registers(constant_speed=self.quirks.constant_speed)
 
     def session(self) -> UltraArmSession:
         """Returns the arm's side of a connection to a new client."""

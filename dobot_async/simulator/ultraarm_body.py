@@ -82,6 +82,7 @@ class Registers:
         speed_mode: How the arm runs through a series of motions.
         servo: Registers of the servos, by servo and address.
         closed: Where the force gripper is closed.
+        constant_speed: Whether M16 S0 takes the ramps away.
     """
 
     relative: bool = False
@@ -99,6 +100,12 @@ class Registers:
     servo: dict[tuple[int, int], int] = field(default_factory=dict)
     closed: int = 20
     stroke: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    constant_speed: bool = False
+
+    @property
+    def acceleration(self) -> float:
+        """mm/s² and degrees/s² of motions; infinite without ramps."""
+        return math.inf if self.constant_speed and self.speed_mode == c.SpeedMode.CONSTANT else ACCELERATION
 
     def release(self, joints: Vector) -> None:
         """Takes the power off the motors, where the joints are: it forgets where that is."""
@@ -206,7 +213,7 @@ def move_coords(registers: Registers, joints: Vector, value: c.CoordsMove) -> Ac
         target = tuple(old if each is None else each for each, old in zip(given, here, strict=True))
 
     own = plus(target, tuple(-each for each in registers.origin))
-    pace = Pace((registers.speed,) * 2, (ACCELERATION,) * 2)
+    pace = Pace((registers.speed,) * 2, (registers.acceleration,) * 2)
     leg = curve_leg(Line(forward(joints), own), joints, Geometry(), pace)
     if leg.fault:
         raise leg.fault
@@ -230,7 +237,7 @@ def move_joint(registers: Registers, joints: Vector, value: c.JointMove) -> Acti
 def turn(registers: Registers, joints: Vector, end: Vector) -> Activity:
     """The joints to angles."""
     checked(end)
-    return travel([joint_leg(joints, end, Pace((registers.speed,) * 4, (ACCELERATION,) * 4))])
+    return travel([joint_leg(joints, end, Pace((registers.speed,) * 4, (registers.acceleration,) * 4))])
 
 
 def home(registers: Registers, joints: Vector, _: None) -> Activity:

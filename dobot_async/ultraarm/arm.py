@@ -22,6 +22,7 @@ from dobot_async.arms.session import arm_session, check_options, run_owned
 from dobot_async.errors import CommandRejected, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.transports import Transport
 from dobot_async.ultraarm import commands as c
+from dobot_async.ultraarm.following import UltraArmFollowing
 from dobot_async.ultraarm.frame import BARRIERS, Frame, Parser, encode
 from dobot_async.ultraarm.gcode import GCodeRun, Source, parse_gcode
 from dobot_async.ultraarm.jog import Jogger, UltraArmJog, direction_of
@@ -49,6 +50,7 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
     Attributes:
         link: The connection, with its state, events and figures.
         queue: The queue of what it is to do, with the same verbs.
+        following: Called for a block in which the arm follows a target: `async with arm.following() as follow`.
         limits: What the arm may be told.
     """
 
@@ -75,6 +77,7 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
         self._executor.keeper = self._runner.keeper
         self._jogger = Jogger(self._runner, link.cleanup)
         self.queue = UltraArmQueue(self._executor, pump)
+        self.following = UltraArmFollowing(self._runner, tolerance, lambda: self.queue)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
 
     @classmethod

@@ -55,6 +55,7 @@ class UltraArmRunner:
 
     Attributes:
         channel: How it is asked.
+        limits: What it may be told.
         state: What is known of it.
         status: What it shows.
         stopper: What stops it.
@@ -80,7 +81,7 @@ class UltraArmRunner:
         self.stopper = Stopper(self.status, self.state, on_stop)
         self.busy = self.jogging = False
         self._link = link
-        self._limits = limits
+        self.limits = limits
         self._tolerance = tolerance
         self._home_switches = home_switches
         self._planned = replace(self.state)  # what it will be once all is done that was prepared
@@ -122,7 +123,7 @@ class UltraArmRunner:
         here = self.status.last
         if self._idle and not self.busy and here and self._planned.increments(command):
             try:
-                self._limits.check(summed(value, here))
+                self.limits.check(summed(value, here))
             except ValueError as error:
                 raise ValueError(f"the increments lead beyond the limits: {error}") from None
 
@@ -130,7 +131,7 @@ class UltraArmRunner:
         """Return a checked entry; raise CommandRejected for motions that the arm cannot do as it will be then."""
         frame = self._link.frame(command, value, queued=True)
         if not self._planned.increments(command):
-            self._limits.check(value)
+            self.limits.check(value)
 
         if self.keeper:
             self.keeper.lead(command, value, Stand(relative=self._planned.relative))
@@ -260,7 +261,7 @@ class UltraArmRunner:
 
         try:
             target = summed(value, await self.status.poll(c.GET_STATUS))
-            self._limits.check(target)
+            self.limits.check(target)
         except KeyError:
             raise MotionUnknown("the arm does not tell where it is, from where increments are added up") from None
         except ValueError as error:

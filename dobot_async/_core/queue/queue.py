@@ -18,7 +18,7 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Coroutine, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractAsyncContextManager, AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TypeVar, overload
 
 from dobot_async._core.queue.epoch import Epoch
@@ -32,6 +32,7 @@ from dobot_async._core.util.arguments import check_timeout
 from dobot_async._core.util.tasks import STAYING
 from dobot_async.errors import (
     ArmAlarm,
+    CommandRejected,
     ConnectionLost,
     DobotError,
     MotionStopped,
@@ -68,11 +69,12 @@ class MotionQueue:
         self._stopper = Stopper(executor, self)
         self._failure: DobotError | None = None
         self._keeping = asyncio.Lock()
+        self._leading: Motion | None = None
 
     @property
     def pending(self) -> int:
         """How many accepted commands are not known to have ended."""
-        return len(self._pending)
+        return len(self._pending) + (self._leading is not None)
 
     async def put(
         self, command: Command[Q, Any], value: Q, *, timeout: float | None = None, epoch: Epoch | None = None
@@ -87,6 +89,7 @@ class MotionQueue:
 
         Raises:
             ValueError: The parameters do not fit, or the command cannot be queued.
+            CommandRejected: The arm follows a target, and takes no commands meanwhile.
             ReplyTimeout: There was no room in time, or the arm is silent; it was not sent.
             ArmAlarm: The arm has raised alarms and makes no more room.
             MotionStopped: The queue was stopped while this waited.
@@ -116,14 +119,7 @@ class MotionQueue:
             motion.call = call
 
         await self._keep(motions)
-        try:
-            epoch.check()
-        except DobotError as error:
-            for motion in motions:
-                motion.end(error)
-
-            raise
-
+        self._check_free(motions, epoch)
         self._outbox.add(motions)
         self.write_on()
         try:
@@ -298,6 +294,9 @@ class MotionQueue:
         if self._outbox.drop(error) or ending:
             self._failure = self._failure or error
 
+        if self._leading:
+            ending.append(self._leading)
+
         for motion in ending:
             motion.end(error)
 
@@ -325,6 +324,27 @@ class MotionQueue:
     def watching(self) -> AbstractContextManager[None]:
         """While this is entered, the arm is asked how far it is."""
         return self._poller.watching()
+
+    def roaming(self) -> AbstractAsyncContextManager[None]:
+        """While this is entered, the arm may go anywhere; in a fleet it waits until it may."""
+        return nullcontext()
+
+    @contextmanager
+    def led_by(self, motion: Motion) -> Iterator[None]:
+        """While this is entered a motion that is not queued has the arm: what is put is refused, and a stop ends it.
+
+        Raises:
+            CommandRejected: Commands are pending, or another such motion has the arm.
+        """
+        if self._leading or self._pending or self._outbox.unaccepted:
+            busy = str(self._leading) if self._leading else f"{self.pending or 'some'} commands are pending: that"
+            raise CommandRejected(f"{busy} has the arm; {motion} can begin when it has ended, or was stopped")
+
+        self._leading = motion
+        try:
+            yield
+        finally:
+            self._leading = None
 
     async def exclusively(self, work: Coroutine[Any, Any, None], what: str, epoch: Epoch | None = None) -> None:
         """Run work while nothing is sent; a stop ends it, and raises MotionStopped.
@@ -437,6 +457,18 @@ class MotionQueue:
     def _first_moving(self) -> Sequence[Motion]:
         """The first motion that is not known to be done, if there is one."""
         return [motion for motion in self._pending if motion.moves and not motion.ended][:1]
+
+    def _check_free(self, motions: Sequence[Motion], epoch: Epoch) -> None:
+        """Raise, and end the Motions, if a stop came since they were made, or something else has the arm."""
+        try:
+            epoch.check()
+            if self._leading:
+                raise CommandRejected(f"{self._leading} has the arm: queue commands when it has ended; none was sent")
+        except DobotError as error:
+            for motion in motions:
+                motion.end(error)
+
+            raise
 
     @contextmanager
     def _unless_stopped(self) -> Iterator[None]:

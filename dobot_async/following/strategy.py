@@ -1,0 +1,77 @@
+"""What a family brings so that its arm follows a target."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from dobot_async.following.points import Point
+
+__all__ = ["Look", "Strategy"]
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What an arm told at one time.
+
+    Attributes:
+        here: Where it is.
+        rests: Whether it says that it stands with nothing more to do; None where it does not say.
+    """
+
+    here: Point
+    rests: bool | None = None
+
+
+class Strategy(Protocol):
+    """How one arm is led. Each call may be cancelled at any moment."""
+
+    @property
+    def axes(self) -> Sequence[str]:
+        """The names of its coordinates, x, y and z first."""
+
+    @property
+    def joints(self) -> int:
+        """How many joints it has."""
+
+    @property
+    def turns(self) -> bool:
+        """Whether its angles are the same after a whole turn."""
+
+    @property
+    def replaces(self) -> bool:
+        """Whether `go` takes the place of the motion that goes on; else it is called at an arm that rests."""
+
+    @property
+    def tolerance(self) -> tuple[float, float]:
+        """How near counts as there, mm and degrees."""
+
+    @property
+    def check_every(self) -> float:
+        """Seconds between two calls of `check`."""
+
+    def allow(self, point: Point) -> None:
+        """Raise ValueError for a place that is beyond the limits, or out of reach."""
+
+    async def begin(self) -> None:
+        """Make the arm ready to be led; raise CommandRejected if it cannot be now."""
+
+    async def look(self, *, joints: bool) -> Look:
+        """Return where the arm is, as coordinates or as joints; raise ReplyTimeout if it is silent."""
+
+    def within(self, look: Look, point: Point) -> Point:
+        """Return how far towards a place the arm may be sent from where it is."""
+
+    async def go(self, point: Point) -> bool:
+        """Send the arm to a place, once; return False if that is known to have been lost.
+
+        Raises:
+            ReplyTimeout: The arm is silent.
+        """
+
+    async def check(self) -> None:
+        """Raise ArmAlarm if something keeps the arm from moving."""
+
+    async def end(self) -> None:
+        """Put back what `begin` has changed, behind the stop."""
