@@ -37,7 +37,7 @@ async def play(
     """Play a recording; all of it is checked before the arm moves.
 
     A step is done when the arm is there, the tool has had its time, and the pause is over. A path in time is gone
-    through as fast as it was shown, where the arm is fast enough; never ahead of it.
+    through as fast as it was shown, or more slowly where the arm needs longer: it rests at each bend.
 
     Args:
         arm: A connected arm of the family, and the model, that was taught.
@@ -87,7 +87,7 @@ async def play_steps(
 
 
 async def play_path(player: TaughtArm, recording: Recording, factor: float, report: Progress) -> None:
-    """Go from sample to sample, each in the time that it took, and no earlier."""
+    """Go from sample to sample, none of them faster than it was shown: an arm that is late rests less, and ends late."""
     path, clock = recording.thinned().path, asyncio.get_running_loop().time
     here = replace(path[0], joints=(await player.look())[1], pose=())
     await player.pace(here, path[0], travel_time(here.joints, path[0].joints))
@@ -96,14 +96,14 @@ async def play_path(player: TaughtArm, recording: Recording, factor: float, repo
     for number, (start, end) in enumerate(itertools.pairwise(path), 2):
         due = began + (end.time - path[0].time) / factor
         if any(abs(a - b) > STILL for a, b in zip(start.joints, end.joints, strict=True)):
-            await player.pace(start, end, max(due - clock(), LEAST))
+            await player.pace(start, end, (end.time - start.time) / factor)
 
         await asyncio.sleep(max(0.0, due - clock()))
         report(number, len(path))
 
 
 STILL = 0.05  # degrees; what is no motion for an arm would be one that it does not begin
-LEAST = 0.01  # seconds; for an arm that is late already
+LEAST = 0.01  # seconds; no way is 0
 DEGREES_PER_SECOND = 30.0
 
 
