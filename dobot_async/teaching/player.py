@@ -87,7 +87,7 @@ async def play_steps(
 
 
 async def play_path(player: TaughtArm, recording: Recording, factor: float, report: Progress) -> None:
-    """Go from sample to sample, none of them faster than it was shown: an arm that is late rests less, and ends late."""
+    """Go from sample to sample, none of them faster than it was shown: who is late rests less."""
     path, clock = recording.thinned().path, asyncio.get_running_loop().time
     here = replace(path[0], joints=(await player.look())[1], pose=())
     await player.pace(here, path[0], travel_time(here.joints, path[0].joints))

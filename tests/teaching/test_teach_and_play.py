@@ -84,6 +84,7 @@ async def test_a_released_cobot_is_led_and_plays_that_in_its_time() -> None:
         recorder = Recorder(arm)
         async with released(arm):
             assert sim.arm.released == set(range(1, 7))
+            sim.arm.guide_to(0, -20, 10, 0, 0, 0)
             async for sample in recorder.samples(20, seconds=4):
                 turned = (
                     20 * sample.time
