@@ -42,12 +42,14 @@ COMMANDS = {
     "jog": ("dobot_async.cli.commands:jog", "Jog in a direction for a time."),
     "monitor": ("dobot_async.cli.monitor:monitor", "Watch pose, queue and alarms."),
     "move": ("dobot_async.cli.commands:move", "Move the tool to a point."),
+    "play": ("dobot_async.cli.teach:play_recording", "Play what an arm was taught."),
     "pose": ("dobot_async.cli.commands:pose", "Tell where tool and joints are, in mm and degrees."),
     "run": ("dobot_async.cli.program:run_program", "Run a program file."),
     "serve": ("dobot_async.cli.serve:serve_on_zenoh", "Put an arm on Zenoh, under a name."),
     "simulate": ("dobot_async.cli.simulate:simulate", "Simulate an arm until Ctrl-C."),
     "stop": ("dobot_async.cli.commands:stop", "Stop the arm now, and empty its queue."),
     "suction": ("dobot_async.cli.commands:suction", "Switch the suction cup."),
+    "teach": ("dobot_async.cli.teach:teach", "Teach the arm, and keep that in a file."),
     "wifi": ("dobot_async.cli.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
 }
 """Where each command is, and what the help says of it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncGenerator, AsyncIterator, Sequence
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import AbstractAsyncContextManager, aclosing
 from dataclasses import replace
 from typing import Any, SupportsFloat, cast
@@ -127,7 +127,7 @@ class Recorder:
         self._recording = replace(self._recording, steps=tuple(steps))
         return last
 
-    async def from_key(self) -> AsyncIterator[TaughtStep]:
+    async def from_key(self) -> AsyncGenerator[TaughtStep, None]:
         """Take a step each time that the key on a Magician's forearm is released, until the loop is left.
 
         Raises:
@@ -141,7 +141,7 @@ class Recorder:
                 pose, joints = self._taught.numbers(found)
                 yield self._take(TaughtStep(pose, joints, self._taught.mode))
 
-    async def samples(self, rate: float, *, seconds: float | None = None) -> AsyncIterator[PathSample]:
+    async def samples(self, rate: float, *, seconds: float | None = None) -> AsyncGenerator[PathSample, None]:
         """Take down where the arm is, so many times a second, until the loop is left or the time is over.
 
         Args:
