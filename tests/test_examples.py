@@ -166,6 +166,15 @@ def check_svg_drawing(output: str) -> None:
     assert [numbers(line) for line in output.splitlines()] == [[98], [2]]
 
 
+def check_teach_and_play(output: str) -> None:
+    assert numbers(output) == [6]
+
+
+def check_palletise(output: str) -> None:
+    """Without a sensor nothing has a colour, and one pallet has room for four."""
+    assert [line.partition(",")[0] for line in output.splitlines()] == ["stacks a part"] * 4 + ["puts back a part"] * 2
+
+
 CHECKS: dict[str, Callable[[str], None]] = {
     "connect_and_read.py": check_connect_and_read,
     "pick_and_place.py": check_pick_and_place,
@@ -185,6 +194,8 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "color_sorter.py": check_color_sorter,
     "rail_pick_and_place.py": check_rail_pick_and_place,
     "svg_drawing.py": check_svg_drawing,
+    "teach_and_play.py": check_teach_and_play,
+    "palletise.py": check_palletise,
 }
 
 

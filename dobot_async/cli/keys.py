@@ -16,7 +16,7 @@ import re
 import sys
 from collections import deque
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from typing import Any, NamedTuple
 
 from dobot_async._core.util.tasks import cancel_and_join
@@ -184,7 +184,8 @@ def keys_of(stream: Any = None) -> Iterator[Keys]:
         finally:
             keys.close()
     finally:
-        termios.tcsetattr(descriptor, termios.TCSANOW, before)
+        with suppress(termios.error):  # it was closed
+            termios.tcsetattr(descriptor, termios.TCSANOW, before)
 
 
 @asynccontextmanager
