@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,7 +20,8 @@ arrows, page up/down   jog the tool along x, y, z while held      [ ]     turn i
 tab                    the same keys jog joints 1 to 3            1 to 7  the joint that [ ] jog then
 space                  take this point       l  go to the next ones by lines, or not
 g  gripper   s  suction, where the arm stands       w  stay 0.5 s longer at the last point
-u  undo   p  play it (any key stops)   c  recover from alarms   ?  this   q  save, and end"""
+u  undo   p  play it, h  drive home (any key stops)   c  recover from alarms
+?  this   q  save, and end"""
 
 TOOL = {"up": "x+", "down": "x-", "left": "y+", "right": "y-", "pageup": "z+", "pagedown": "z-"}
 JOINTS = {"up": "j2+", "down": "j2-", "left": "j1+", "right": "j1-", "pageup": "j3+", "pagedown": "j3-"}
@@ -145,19 +146,27 @@ class Pendant:
         if not self.keys.is_fresh(key, RECENTLY):
             return
 
-        playing = asyncio.create_task(play(self.recorder.arm, self.recorder.recording, speed=self.speed))
-        pressing = asyncio.create_task(self.keys.next())
+        await self.watched(play(self.recorder.arm, self.recorder.recording, speed=self.speed), "played")
+
+    async def home(self, key: Key) -> None:
+        """Drive home; any key stops the arm."""
+        if self.keys.is_fresh(key, RECENTLY):
+            await self.watched(self.recorder.arm.home(), "home")
+
+    async def watched(self, motion: Coroutine[Any, Any, None], done: str) -> None:
+        """Do something that any key stops."""
+        moving, pressing = asyncio.create_task(motion), asyncio.create_task(self.keys.next())
         try:
-            await asyncio.wait([playing, pressing], return_when=asyncio.FIRST_COMPLETED)
-            done = playing.done()
+            await asyncio.wait([moving, pressing], return_when=asyncio.FIRST_COMPLETED)
+            ended = moving.done()
         finally:
-            await cancel_and_join(playing)
+            await cancel_and_join(moving)
             await cancel_and_join(pressing)
 
-        if done:
-            playing.result()
+        if ended:
+            moving.result()
 
-        self.say("played" if done else "stopped")
+        self.say(done if ended else "stopped")
 
     def tell(self, step: TaughtStep) -> None:
         """Tell what the last point is."""
@@ -183,6 +192,7 @@ ACTIONS: dict[str, Callable[[Any, Key], Awaitable[None]]] = {
     "w": Pendant.stay,
     "l": Pendant.toggle_lines,
     "p": Pendant.play,
+    "h": Pendant.home,
     "c": Pendant.recover,
     "tab": Pendant.toggle_joints,
     "?": Pendant.help,

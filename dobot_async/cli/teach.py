@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from contextlib import aclosing, suppress
 from pathlib import Path
@@ -47,10 +48,13 @@ def teach(session: Session, /, file: Path, speed: float, tool: str, **options: A
     if file.suffix.lower() == PLAYBACK and session.arm != "magician":
         raise click.UsageError(f"a {PLAYBACK} file is for --arm magician alone")
 
+    if not os.access(file.parent, os.W_OK):
+        raise click.UsageError(f"{file}: nothing can be written there")
+
     before = read(file) if file.exists() else None
     check_options(session, before, **options)
     session.target()
-    kept: list[Recording] = []
+    kept: list[tuple[Path, Recording]] = []
     try:
         run(taught_by(session, file, before, kept, speed=speed, tool=tool, **options))
     except click.UsageError:
@@ -61,9 +65,9 @@ def teach(session: Session, /, file: Path, speed: float, tool: str, **options: A
 
         raise
 
-    recording = kept[-1] if kept else Recording(session.arm)
+    written, recording = kept[-1] if kept else (file, Recording(session.arm))
     counts = {"steps": len(recording.steps), "samples": len(recording.path), "seconds": recording.duration}
-    session.output.answer({"file": str(file), **counts}, words(file, kept))
+    session.output.answer({"file": str(written), **counts}, words(file, kept))
 
 
 def check_options(
@@ -115,7 +119,7 @@ async def taught_by(
     yes: bool,  # noqa: ARG001 - was looked at
 ) -> None:
     """Teach, and write the file, whatever ends it."""
-    from dobot_async.teaching import Recorder, save_recording
+    from dobot_async.teaching import Recorder
 
     async with session.connect() as arm:
         try:
@@ -133,8 +137,24 @@ async def taught_by(
         finally:
             recording = recorder.recording
             if recording != before and (recording.steps or len({each.joints for each in recording.path}) > 1):
-                save_recording(recording, file)
-                kept.append(recording)
+                kept.append((keep(recording, file), recording))
+
+
+def keep(recording: Any, file: Path) -> Path:
+    """Write a recording, as JSON if the file cannot hold it; return where."""
+    from dobot_async.teaching import RecordingUnfit, save_recording
+
+    try:
+        save_recording(recording, file)
+    except RecordingUnfit as error:
+        click.echo(f"warning: {file.name} cannot hold it: {error}", err=True)
+        file = file.with_suffix(".json")
+        while file.exists():
+            file = file.with_stem(f"{file.stem}-new")
+
+        save_recording(recording, file)
+
+    return file
 
 
 async def by_keys(session: Session, recorder: Any, speed: float) -> None:
@@ -199,7 +219,7 @@ def words(file: Path, kept: list[Any]) -> str:
     if not kept:
         return f"{file}: nothing new, and not written"
 
-    recording = kept[-1]
+    file, recording = kept[-1]
     if recording.path:
         return f"{file}: {len(recording.path)} samples in {recording.duration:.1f} s"
 

@@ -55,13 +55,17 @@ class Recorder:
             recording: What to go on with; of the same family and model.
 
         Raises:
-            ValueError: The recording is another arm's.
+            ValueError: The recording is another arm's, or was made with another tool.
         """
         self.arm: Any = arm
         self._taught = taught(arm)
         family, model = self._taught.limits.family, self._taught.model
         if recording and (recording.family, recording.model) != (family, model):
             raise ValueError(f"the recording is of a {recording.model or recording.family}, not of a {model or family}")
+
+        misfits = self._taught.limits.misfits(recording) if recording else []
+        if misfits:
+            raise ValueError(misfits[0])
 
         offset = self._taught.tool_offset
         self._recording = replace(recording, path=()) if recording else Recording(family, model, tool, offset)

@@ -297,6 +297,26 @@ async def test_any_key_stops_what_is_played(sim: Simulation, tmp_path: Path) -> 
         assert await at.end() == 0
 
 
+async def test_what_a_playback_file_cannot_hold_is_kept_as_json(tmp_path: Path) -> None:
+    file = tmp_path / "part.playback"
+    (tmp_path / "part.json").write_text("something else")
+    async with simulate(listen="tcp://127.0.0.1:0", homed=True, speed=FAST) as sim, taught(sim, file) as at:
+        for key in " sg":
+            at.press(key)
+            await at.sees("point ")
+
+        at.press("h")
+        await at.sees("home")
+        at.press("q")
+        assert await at.end() == 0
+        await at.sees("part.playback cannot hold it: a row has suction or a gripper")
+        await at.sees("part-new.json: 1 points")
+
+    assert sorted(os.listdir(tmp_path)) == ["part-new.json", "part.json"]
+    (step,) = load_recording(tmp_path / "part-new.json").steps
+    assert (step.suction, step.gripper) == (True, 0)
+
+
 async def test_an_end_of_the_way_is_told_and_can_be_left(tmp_path: Path) -> None:
     async with (
         simulate("mycobot280", listen="tcp://127.0.0.1:0", speed=FAST) as sim,
@@ -455,6 +475,7 @@ async def test_a_playback_file_is_played_and_what_is_not_known_in_it_is_told(sim
         ["teach", "FILE", "--hand", "--arm", "mycobot"],
         ["teach", "FILE", "--hand", "--yes", "--count", "2", "--arm", "mycobot"],
         ["teach", "part.playback", "--hand", "--yes", "--arm", "ultraarm"],
+        ["teach", "/nowhere/part.json", "--hand"],
         ["play", "FILE"],
         ["play", "FILE", "--loop", "-1"],
     ],

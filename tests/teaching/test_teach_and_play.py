@@ -420,6 +420,9 @@ def test_without_an_arm_the_usual_limits_count() -> None:
 async def test_a_tool_that_was_told_afterwards_counts() -> None:
     recording = Recording("magician", tool_offset=(61, 0, 0), steps=(HERE,))
     async with simulate(homed=True) as sim, Magician.connect(sim.url) as arm:
+        with pytest.raises(ValueError, match="set_end_effector"):
+            Recorder(arm, recording=recording)
+
         await arm.set_end_effector(Pen())
         await play(arm, recording)
         assert len(targets(sim)) == 1
