@@ -35,6 +35,26 @@ def ended() -> Iterator[None]:
             thread.join(1)
 
 
+SHELL = """
+import fcntl, os, signal, sys, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+child = os.fork()
+if not child:
+    os.setpgid(0, 0)
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+    os.tcsetpgrp(0, os.getpid())
+    signal.signal(signal.SIGTTOU, signal.SIG_DFL)
+    os.execv(sys.argv[1], sys.argv[1:])
+_, status = os.waitpid(child, os.WUNTRACED)
+if os.WIFSTOPPED(status):
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    os._exit(99)
+os._exit(os.waitstatus_to_exitcode(status))
+"""
+"""What a shell does for a program in the foreground of its terminal, so that Ctrl-C and Ctrl-Z are signals."""
+
+
 class Terminal:
     """A program at a pseudo-terminal."""
 
@@ -79,9 +99,12 @@ class Terminal:
 
 
 @asynccontextmanager
-async def terminal(*arguments: str) -> AsyncIterator[Terminal]:
+async def terminal(*arguments: str, shell: bool = False) -> AsyncIterator[Terminal]:
     master, slave = os.openpty()
-    process = await asyncio.create_subprocess_exec(*MODULE, *arguments, stdin=slave, stdout=slave, stderr=slave)
+    command = (*((sys.executable, "-c", SHELL) if shell else ()), *MODULE, *arguments)
+    process = await asyncio.create_subprocess_exec(
+        *command, stdin=slave, stdout=slave, stderr=slave, start_new_session=shell
+    )
     os.close(slave)
     try:
         yield Terminal(process, master)
@@ -96,11 +119,15 @@ async def terminal(*arguments: str) -> AsyncIterator[Terminal]:
 
 
 @asynccontextmanager
-async def taught(sim: Simulation, file: Path, *options: str) -> AsyncIterator[Terminal]:
+async def taught(sim: Simulation, file: Path, *options: str, shell: bool = False) -> AsyncIterator[Terminal]:
     """`teach` with an arm at a terminal, once it takes keys."""
-    async with terminal("--url", sim.url, "teach", str(file), *options) as at:
+    async with terminal("--url", sim.url, "teach", str(file), *options, shell=shell) as at:
         await at.sees("save, and end")
         yield at
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
 
 
 async def run(*arguments: str, text: str = "") -> tuple[int, str, str]:
@@ -208,17 +235,20 @@ async def test_a_signal_stops_the_arm_and_keeps_what_was_taken(
 
 
 async def test_it_cannot_be_suspended_by_a_key_while_the_arm_moves(sim: Simulation, tmp_path: Path) -> None:
-    """Ctrl-Z and Ctrl-S, which would leave nobody to stop the arm, are keys as any other."""
-    async with taught(sim, tmp_path / "part.json") as at:
-        for key in ("\x1a", "\x13"):
+    """Ctrl-Z and Ctrl-S, which would leave nobody to stop the arm, are keys as any other; Ctrl-C is what it is."""
+    async with taught(sim, tmp_path / "part.json", shell=True) as at:
+        for number, key in enumerate(("\x1a", "\x13"), 1):
             start = sim.arm.pose
             await at.hold(PAGE_UP, lambda start=start: sim.arm.pose.z > start.z)  # type: ignore[misc]
             at.press(key)
             await stands(sim)
+            at.press(" ")
+            await at.sees(f"point {number}")
 
-        at.press(" q")
-        await at.sees("point 1")
-        assert await at.end() == 0
+        await at.hold(PAGE_UP, lambda: sim.arm.device.moving)
+        at.press("\x03")
+        assert await at.end() == 130
+        await stands(sim)
 
 
 async def test_a_terminal_that_is_closed_ends_it(sim: Simulation, tmp_path: Path) -> None:
@@ -312,7 +342,7 @@ async def test_what_a_playback_file_cannot_hold_is_kept_as_json(tmp_path: Path) 
         await at.sees("part.playback cannot hold it: a row has suction or a gripper")
         await at.sees("part-new.json: 1 points")
 
-    assert sorted(os.listdir(tmp_path)) == ["part-new.json", "part.json"]
+    assert names_in(tmp_path) == ["part-new.json", "part.json"]
     (step,) = load_recording(tmp_path / "part-new.json").steps
     assert (step.suction, step.gripper) == (True, 0)
 
