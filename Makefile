@@ -3,7 +3,7 @@
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
 # make format    what ruff can mend
-# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell]
+# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|stops]
 # make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 
@@ -62,6 +62,7 @@ ANSWERS ?= 200000
 
 promises: $(VENV)/.dev
 	PROMISES=all $(BIN)/python -m pytest -n auto tests/promises
+	MOMENTS=all $(BIN)/python -m pytest -n auto tests/fleet/test_past_a_stop.py
 	$(BIN)/python -W ignore tests/promises/stale.py --answers $(ANSWERS)
 
 # Guided by coverage if the extra `fuzz` (atheris) is installed.

@@ -33,7 +33,7 @@ from dobot_async.simulator import MyCobotQuirks, Simulation, simulate
 from dobot_async.transports.baud import AtBaud, Wired
 from dobot_async.transports.terminal import on_pty
 
-__all__ = ["AT_ONCE", "Arms", "arms", "crowd"]
+__all__ = ["AT_ONCE", "Arms", "Clock", "arms", "crowd"]
 
 AT_ONCE = 1e6
 """The speed of an arm that executes at once."""
@@ -202,6 +202,16 @@ def crowd(listen: str, count: int, **details: Any) -> Iterator[list[Arms]]:
         yield [stack.enter_context(arms(listen, count=share, **details)) for share in shares]
 
 
+class Clock:
+    """The computer's own time, which all processes share, times `speed`."""
+
+    def __init__(self, speed: float) -> None:
+        self.speed = speed
+
+    def __call__(self) -> float:
+        return time.monotonic() * self.speed
+
+
 async def serve(selector: Woken, *, listen: str, model: str, speed: float, count: int, hears: str) -> None:
     """Runs the arms until the input ends."""
     loop = asyncio.get_running_loop()
@@ -211,7 +221,7 @@ async def serve(selector: Woken, *, listen: str, model: str, speed: float, count
                 simulate(
                     model,
                     listen="memory" if hears else listen,
-                    clock=lambda: time.monotonic() * speed,
+                    clock=Clock(speed),
                     **QUIRKS.get(model, {}),
                 )
             )

@@ -14,7 +14,7 @@ from collections.abc import Awaitable, Callable
 
 import minimal
 import others
-from arm import arms
+from arm import Clock, arms
 from report import BAUD, Row, parsed, percentile, show
 
 from dobot_async import Magician, PTPMode
@@ -81,7 +81,7 @@ async def in_memory(motions: int) -> list[Row]:
     """The clients that can use memory."""
     rows = []
     for name, measure in CLIENTS.items():
-        async with simulate(clock=lambda: time.monotonic() * SPEED) as sim:
+        async with simulate(clock=Clock(SPEED)) as sim:
             found = await measure(sim.url, motions)
             done = [each.finished / SPEED for each in sim.arm.executed if each.name == PTP]
             rows.append(row_of("memory", name, found, done))

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async.errors import ReplyTimeout
 from dobot_async.fleet.claims import Claims, Party, Pause
 from dobot_async.fleet.errors import BarrierBroken, ZoneDeadlock
@@ -63,7 +64,13 @@ class Barriers:
         self._gone: dict[tuple[int, str], str] = {}
 
     async def wait(
-        self, name: str, parties: Collection[str], program: Program, arms: frozenset[Party], timeout: float | None
+        self,
+        name: str,
+        parties: Collection[str],
+        program: Program,
+        arms: frozenset[Party],
+        timeout: float | None,
+        epoch: Epoch,
     ) -> None:
         """Returns when as many have come as there are parties.
 
@@ -73,13 +80,16 @@ class Barriers:
             program: Who comes.
             arms: Those that wait for its command.
             timeout: Seconds.
+            epoch: That of the fleet.
 
         Raises:
+            MotionStopped: The fleet was stopped meanwhile.
             ValueError: It was reached with other parties before.
             BarrierBroken: One of them failed, ended or gave up.
             ZoneDeadlock: One of them waits, in the end, for what this program holds.
             ReplyTimeout: They did not all come in time; for the others it is broken.
         """
+        program.check()
         part = program.part()
         run = part.run if part else None
         gathering = self._gatherings.setdefault((id(run), name), Gathering(frozenset(parties)))
@@ -116,7 +126,13 @@ class Barriers:
 
             raise
 
+        epoch.check()
         check(name, why_not)
+
+    def stop(self) -> None:
+        """Ends all waiting, as the fleet was stopped; who comes later begins anew."""
+        for gathering in self._gatherings.values():
+            gathering.open("the fleet was stopped")
 
     def leave(self, party: str, why: str, *, run: object = None) -> None:
         """Takes note that somebody will come to no barrier any more."""

@@ -53,6 +53,8 @@ class Claim:
         patient: False gives it an error where it would have to wait.
         stuck: The parties that release nothing as long as it waits: its own, and the arms that wait for its command.
         asker: Who goes on when it is answered; by default `party`.
+        movers: The arms that move when it is granted, whose stop ends it; by default `party`.
+        parked: Tells of an arm that stands whether nobody is left who would move it.
     """
 
     party: Party
@@ -62,10 +64,13 @@ class Claim:
     patient: bool = True
     stuck: frozenset[Party] = frozenset()
     asker: Party | None = None
+    movers: frozenset[Party] = frozenset()
+    parked: Callable[[Party], bool] = field(default=lambda _: False)
 
     def __post_init__(self) -> None:
         self.stuck |= self.own
         self.asker = self.asker or self.party
+        self.movers = self.movers or frozenset([self.party])
 
 
 @dataclass(eq=False, slots=True)
@@ -171,8 +176,12 @@ class Claims:
         self._end(lambda claim: not claim.stuck.isdisjoint(parties), error)
 
     def interrupt(self, party: Party, error: DobotError) -> None:
-        """Ends the waiting of one party alone."""
-        self._end(lambda claim: claim.party is party, error)
+        """Ends the waiting for what one party is to move by; not that of programs which act for it."""
+        self._end(lambda claim: party in claim.movers, error)
+
+    def stop(self, error: DobotError) -> None:
+        """Ends all waiting."""
+        self._end(lambda _: True, error)
 
     def settle(self) -> None:
         """Answers all that can be answered; to be called when a party has failed."""
@@ -252,14 +261,14 @@ class Claims:
         return [wait for wait in waits if obstacle(wait)]
 
     def _hopeless(self) -> Iterator[tuple[Claim, DobotError]]:
-        """Claims that wait for somebody who has failed, or for themselves."""
+        """Claims that wait for somebody who has failed, for an arm that nobody moves any more, or for themselves."""
         for claim in reversed(self._waiting):
             for party, zone in self._foreign(claim):
                 if party.failure:
-                    yield (
-                        claim,
-                        ZoneOccupied(f"{party.name} has failed, and may still be in zone {zone}: {party.failure}"),
-                    )
+                    failed = f"{party.name} has failed, and may still be in zone {zone}: {party.failure}"
+                    yield claim, ZoneOccupied(failed)
+                elif not party.moving() and claim.parked(party):
+                    yield claim, ZoneOccupied(f"{party.name} is in zone {zone}, and no program is left that moves it")
 
             cycle = self._cycle(claim) if claim.patient else []
             if cycle:

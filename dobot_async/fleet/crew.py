@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator, Collection, Mapping
 from contextlib import asynccontextmanager
 from typing import Any, Generic, Literal, Self, TypeVar
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.barriers import Barriers
@@ -48,6 +49,7 @@ class Crew(Generic[A]):
         }
         self._stopping: dict[asyncio.Task[None], Seat] = {}
         self._leaving = False
+        self._epoch = Epoch()
 
     @asynccontextmanager
     async def _connected(self, options: Mapping[str, Any]) -> AsyncIterator[Self]:
@@ -110,7 +112,6 @@ class Crew(Generic[A]):
 
         self.failures[failed.name] = error
         failed.party.failure = error
-        self._zones.drop(failed.party)
         self._zones.claims.fail([failed.party], error)
         self._barriers.fail(failed.name, str(error))
         affected = [seat for seat in self._affected(failed.name) if not seat.stopped]
@@ -125,7 +126,7 @@ class Crew(Generic[A]):
                 continue
 
             if seat.commands:
-                task = seat.begin_stop(seat.stopped)
+                task = seat.queue.begin_stop(seat.stopped)
                 self._stopping[task] = seat
                 task.add_done_callback(self._stopping.pop)
 

@@ -8,21 +8,27 @@ A family is one of `FAMILIES`.
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+import asyncio
+import math
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, nullcontext
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from functools import partial
+from typing import Any, Protocol, TypeVar, cast
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async._core.queue.queue import MotionQueue
-from dobot_async._core.util.arguments import check_timeout
 from dobot_async._core.util.hooks import Hooks
-from dobot_async.errors import DobotError
+from dobot_async.errors import ReplyTimeout
 from dobot_async.families import Each
 from dobot_async.fleet.frames import Place
+from dobot_async.fleet.magician_planner import MagicianPlanner
+from dobot_async.fleet.planner import Planner, Unplanned
+from dobot_async.fleet.queue import FleetQueue
 from dobot_async.magician import commands as magician
-from dobot_async.magician.arm import Jog, Magician
+from dobot_async.magician.arm import Magician
+from dobot_async.magician.jogs import Jog
 from dobot_async.magician.queue import Batch, MagicianQueue
+from dobot_async.magician.stopping import STILL
 from dobot_async.mycobot import commands as mycobot
 from dobot_async.mycobot.arm import MyCobot
 from dobot_async.mycobot.queue import CobotBatch, CobotQueue
@@ -30,60 +36,22 @@ from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
 from dobot_async.ultraarm.queue import UltraArmBatch, UltraArmQueue
 from dobot_async.wire import Command
 
-__all__ = ["FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "AnyArm", "Family", "FleetQueue", "Overseer", "family_of"]
+__all__ = ["FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "AnyArm", "Family", "family_of"]
 
 AnyArm = Magician | MyCobot | UltraArm
 PLENTY = 1000
 """Commands that a queue on this side takes."""
 
-
-class Overseer(Protocol):
-    """What a queue of the fleet reports to."""
-
-    def admitted(self, motions: Sequence[Motion], timeout: float | None) -> AbstractAsyncContextManager[float | None]:
-        """While this is entered, motions may be sent; raises if they may not be. Yields the seconds that are left."""
-
-    def roaming(self) -> AbstractAsyncContextManager[None]:
-        """While this is entered, the arm may go anywhere; raises if it may not."""
-
-    def ended(self, error: DobotError) -> None:
-        """Takes note of what ends all motions of the arm."""
-
-
-class FleetQueue(MotionQueue):
-    """The part of a queue that reports to the fleet.
-
-    Attributes:
-        overseer: To whom; None until the arm is in its fleet.
-    """
-
-    overseer: Overseer | None = None
-
-    async def put_all(self, motions: Sequence[Motion], *, timeout: float | None = None) -> None:
-        """Gives several commands to the arm's queue once the fleet allows them; see `MotionQueue.put_all`."""
-        if self.overseer is None:
-            await super().put_all(motions, timeout=timeout)
-            return
-
-        async with self.overseer.admitted(motions, check_timeout(timeout)) as left:
-            await super().put_all(motions, timeout=left)
-
-    def fail(self, error: DobotError, *, spare: Sequence[Motion] = ()) -> None:
-        """Ends all Motions with an error, and tells the fleet; see `MotionQueue.fail`."""
-        if self.overseer:
-            self.overseer.ended(error)
-
-        super().fail(error, spare=spare)
-
-    @asynccontextmanager
-    async def roaming(self) -> AsyncIterator[None]:
-        """While this is entered, the arm may go anywhere."""
-        if self.overseer is None:
-            yield
-            return
-
-        async with self.overseer.roaming():
-            yield
+LOOK = 0.1  # seconds between two looks at an arm that still does what was left in its queue
+WAYS_DEPEND_ON = (
+    magician.EndEffectorParams,
+    magician.PTPJumpParams,
+    magician.PTPJump2Params,
+    magician.DeviceWithL,
+    magician.JOGCmd,
+)
+Q = TypeVar("Q")
+R = TypeVar("R")
 
 
 class FleetMagicianQueue(FleetQueue, MagicianQueue):
@@ -106,10 +74,33 @@ class FleetMagician(Magician):
         self._executor.on_unknown = Hooks()  # it told the queue that this one replaces
         self.queue: FleetMagicianQueue = FleetMagicianQueue(self._executor)
 
+    async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
+        """Sends any row immediately; what ways depend on, once the fleet allows it; see `Magician.request`."""
+        async with self.queue.changing(value) if isinstance(value, WAYS_DEPEND_ON) else nullcontext():
+            return await super().request(command, value, timeout=timeout)
+
+    async def set_end_effector(self, tool: magician.EndEffectorParams, *, timeout: float | None = None) -> None:
+        """Says which tool is on the arm, once the fleet allows it; see `Magician.set_end_effector`."""
+        async with self.queue.changing(tool):
+            await super().set_end_effector(tool, timeout=timeout)
+
+    async def set_rail(self, *, on: bool = True, **options: Any) -> None:
+        """Says whether the arm stands on a rail, once the fleet allows it; see `Magician.set_rail`."""
+        async with self.queue.changing(magician.DeviceWithL(on)):
+            await super().set_rail(on=on, **options)
+
     @asynccontextmanager
     async def jogging(self, direction: Jog | str) -> AsyncIterator[None]:
-        """Jogs until the block ends, once the fleet allows it; see `Magician.jogging`."""
-        async with self.queue.roaming(), super().jogging(direction):
+        """Jogs until the block ends, once the fleet allows it; see `Magician.jogging`.
+
+        Raises:
+            MotionStopped: It has come to the limits of the arm, where it was stopped.
+        """
+
+        async def halt() -> None:
+            await self.link.request(magician.SET_JOG_CMD, STILL, timeout=math.inf, urgent=True)
+
+        async with self.queue.roaming(halt), super().jogging(direction):
             yield
 
 
@@ -152,6 +143,9 @@ class Family:
         name: Its word in a cell file.
         kind: Its class in a fleet.
         batch: Makes an empty batch for a queue.
+        planner: Makes what knows its ways, and the heading of its rail.
+        recover: Makes it ready again after a failure.
+        leftovers: Waits until it has done what an earlier program has left in its queue.
         stop: The command that stops it, is acknowledged, and may be sent twice; None if there is none.
         ask: A cheap question, for measuring how long an answer takes.
         place: Tells where the tool is.
@@ -163,11 +157,37 @@ class Family:
     name: str
     kind: type[Any]
     batch: Callable[[Any], Any]
+    planner: Callable[[Any, float | None], Planner[Any]]
+    recover: Callable[[Any], Awaitable[None]]
+    leftovers: Callable[[Any], Awaitable[None]]
     ask: Callable[[Any], Awaitable[object]]
     place: Callable[[Any], Awaitable[Place]]
     room: Callable[[Any], Awaitable[int]]
     pauses: bool = True
     stop: Command[None, Any] | None = None
+
+
+class HasCoords(Protocol):
+    """An arm that tells where its tool is."""
+
+    async def get_coords(self) -> Coords:
+        """Returns it."""
+
+
+class Coords(Protocol):
+    """Where a tool is, mm."""
+
+    @property
+    def x(self) -> float:
+        """Forward."""
+
+    @property
+    def y(self) -> float:
+        """To the left."""
+
+    @property
+    def z(self) -> float:
+        """Up."""
 
 
 async def magician_place(arm: Magician) -> Place:
@@ -176,10 +196,45 @@ async def magician_place(arm: Magician) -> Place:
     return Place(pose.x, pose.y, pose.z, pose.r)
 
 
-async def coords_place(arm: MyCobot | UltraArm) -> Place:
+async def coords_place(arm: HasCoords) -> Place:
     """Where the tool of another arm is."""
     coords = await arm.get_coords()
     return Place(coords.x, coords.y, coords.z)
+
+
+def unplanned(arm: HasCoords, _: float | None) -> Unplanned:
+    """What knows no ways."""
+    return Unplanned(partial(coords_place, arm))
+
+
+async def cleared(arm: FleetMyCobot | FleetUltraArm) -> None:
+    """Empties the queue of an arm, and lets it run."""
+    await arm.queue.clear()
+
+
+async def magician_leftovers(arm: FleetMagician) -> None:
+    """Waits for a mark behind what lies in the queue: the index alone tells how far the arm is with all before it."""
+    mark = Motion(arm.queue, arm.queue.prepare(magician.SET_WAIT_CMD, magician.WAITCmd(0)))
+    while True:
+        try:
+            await arm.queue.put_admitted([mark], None, arm.queue.epoch)
+        except ReplyTimeout:
+            await asyncio.sleep(LOOK)
+            mark = Motion(arm.queue, mark.entry)
+        else:
+            break
+
+    await mark
+
+
+async def nothing_left(_: object) -> None:
+    """An arm without a queue has nothing left but the motion that it is at, which shows."""
+
+
+async def ultraarm_leftovers(arm: FleetUltraArm) -> None:
+    """Waits until an ultraArm's own queue is empty."""
+    while await arm.get_queue_size():  # noqa: ASYNC110 - the arm is asked
+        await asyncio.sleep(LOOK)
 
 
 async def plenty(_: object) -> int:
@@ -192,6 +247,9 @@ MAGICIAN = Family(
     name="magician",
     kind=FleetMagician,
     batch=lambda arm: Batch(arm.queue),
+    planner=MagicianPlanner,
+    recover=lambda arm: cast(Magician, arm).recover(),
+    leftovers=magician_leftovers,
     ask=lambda arm: cast(Magician, arm).request(magician.GET_QUEUED_CMD_CURRENT_INDEX, None),
     place=magician_place,
     room=lambda arm: cast(Magician, arm).request(magician.GET_QUEUED_CMD_LEFT_SPACE, None),
@@ -203,6 +261,9 @@ MYCOBOT = Family(
     name="mycobot",
     kind=FleetMyCobot,
     batch=lambda arm: CobotBatch(arm.queue, arm.model),
+    planner=unplanned,
+    recover=cleared,
+    leftovers=nothing_left,
     ask=lambda arm: cast(MyCobot, arm).request(mycobot.IS_POWER_ON, None),
     place=coords_place,
     room=plenty,
@@ -213,6 +274,9 @@ ULTRAARM = Family(
     name="ultraarm",
     kind=FleetUltraArm,
     batch=lambda arm: UltraArmBatch(arm.queue, arm.pump),
+    planner=unplanned,
+    recover=cleared,
+    leftovers=ultraarm_leftovers,
     ask=lambda arm: cast(UltraArm, arm).get_queue_size(),
     place=coords_place,
     room=plenty,

@@ -27,7 +27,7 @@ from dobot_async.fleet.families import AnyArm
 from dobot_async.fleet.frames import BaseFrame, Place
 from dobot_async.fleet.seat import Member, Seat, tell_to_stop
 from dobot_async.fleet.shapes import Shape
-from dobot_async.fleet.together import Together, abandon, launch
+from dobot_async.fleet.together import Launch, Together, abandon
 from dobot_async.fleet.work import all_of, named, side_by_side
 from dobot_async.fleet.zones import Program, Run, here, running
 from dobot_async.magician.arm import Magician
@@ -180,11 +180,15 @@ class Fleet(Crew[A]):
             DobotError: The first failure, with the arm's name; what the others did was cancelled, so that they stop,
                 unless their group goes on.
         """
+        parent, epoch = here(), self._epoch
 
         async def done(seat: Seat) -> Any:
             method = getattr(seat.arm, verb) if isinstance(verb, str) else None
+            part = Program(Party(f"each {seat.name}"), asyncio.current_task(), parent, epoch=epoch)
             try:
-                return await (method(*args, **kwargs) if method else verb(seat.arm, *args, **kwargs))
+                with running(part):
+                    part.check()
+                    return await (method(*args, **kwargs) if method else verb(seat.arm, *args, **kwargs))
             except (DobotError, ValueError) as error:
                 named(seat.name, error)
                 raise
@@ -195,6 +199,10 @@ class Fleet(Crew[A]):
 
     async def stop(self, *, timeout: float = STAYING) -> None:
         """Stops all arms, at the same time; pending Motions raise MotionStopped.
+
+        Nothing that has begun before goes on: programs of `run` and `each`, and blocks of `together`, get MotionStopped
+        wherever they are, at barriers and while they wait for zones too, and for whatever they command after it. The
+        program that calls this goes on: it knows.
 
         Args:
             timeout: Seconds to wait for the arms to acknowledge it; it is repeated after that, too, and when this call
@@ -211,6 +219,11 @@ class Fleet(Crew[A]):
             raise ValueError("a stop is a command, and these connections only read (control=False)")
 
         tell_to_stop(seats)
+        error = MotionStopped("the fleet was stopped")
+        self._epoch = self._epoch.end(error)
+        here().go_on(self._epoch)
+        self._barriers.stop()
+        self._zones.claims.stop(error)
         stops = {seat.name: seat.begin_stop(MotionStopped("the arm was told to stop")) for seat in seats}
         await asyncio.wait(stops.values(), timeout=within)
         await all_of({name: stopped(stop, timeout) for name, stop in stops.items()})
@@ -223,15 +236,17 @@ class Fleet(Crew[A]):
         """
 
         async def recovered(seat: Seat) -> None:
-            await (seat.arm.recover() if hasattr(seat.arm, "recover") else seat.queue.clear())
+            await seat.family.recover(seat.arm)
             await seat.locate()
 
         await self._stops_heard()
+        reasons = {name: seat.stopped for name, seat in self._seats.items()}
         await all_of({name: recovered(seat) for name, seat in self._seats.items()})
         self._barriers.forget()
-        for seat in self._seats.values():
-            seat.stopped = None
-            self._works(seat)
+        for name, seat in self._seats.items():
+            if seat.stopped is reasons[name]:  # else another failure has stopped it meanwhile
+                seat.stopped = None
+                self._works(seat)
 
     async def run(self, programs: Mapping[str, Coroutine[Any, Any, T]]) -> dict[str, T]:
         """Runs programs side by side, and returns what each has returned.
@@ -243,13 +258,14 @@ class Fleet(Crew[A]):
             BaseException: The first failure, when all have ended; the others were cancelled, unless the group of the
                 arm that failed lets them go on.
         """
-        parent, run = here(), Run({name: Party(f"program {name}") for name in programs})
+        parent, epoch = here(), self._epoch
+        run = Run({name: Party(f"program {name}") for name in programs}, set(programs))
 
         async def ran(name: str, program: Coroutine[Any, Any, T]) -> T:
             arm = name if name in self._seats else None
-            part = Program(run.parties[name], asyncio.current_task(), parent, arm, run)
+            part = Program(run.parties[name], asyncio.current_task(), parent, arm, run, epoch)
             if arm:
-                self._zones.drivers[arm] = part.task
+                self._zones.drive(arm, part)
 
             why = "has ended"
             try:
@@ -263,6 +279,7 @@ class Fleet(Crew[A]):
                 raise
             finally:
                 self._barriers.leave(name, f"{name} {why}", run=run)
+                self._zones.leave(part, name)
 
         async with self._stopping_others():
             try:
@@ -283,11 +300,13 @@ class Fleet(Crew[A]):
             BarrierBroken: One of them failed, ended or gave up; it stays broken for the run, or until `recover`.
             ZoneDeadlock: Among programs of a `run`: one of them waits, in the end, for a zone that this one holds.
             ReplyTimeout: They did not all come in time.
+            MotionStopped: The fleet was stopped meanwhile.
         """
         program = here()
         part = program.part()
         names = parties or (part.run.parties if part and part.run else self._seats)
-        await self._barriers.wait(name, frozenset(names), program, self._zones.driven(program), timeout)
+        arms = self._zones.driven(program)
+        await self._barriers.wait(name, frozenset(names), program, arms, timeout, self._epoch)
 
     def zone(self, name: str, *arms: str, timeout: float | None = None) -> AbstractAsyncContextManager[None]:
         """Holds a zone for the length of a block; nobody else does.
@@ -301,14 +320,14 @@ class Fleet(Crew[A]):
         Raises:
             ValueError: There is no such zone.
             ZoneDeadlock: Its holder waits, in the end, for who asks.
-            ZoneOccupied: An arm that has failed may be in it.
+            ZoneOccupied: An arm that has failed may be in it; or, in a `run`, one is that no program moves any more.
             ReplyTimeout: It was not free in time.
-            MotionStopped: The fleet was stopped because of a failure while this waited.
+            MotionStopped: The fleet was stopped while this waited.
         """
         for arm in arms:
             self._seat(arm)
 
-        return self._zones.hold(name, arms, timeout)
+        return self._zones.hold(name, arms, timeout, self._epoch)
 
     def holders(self, zone: str) -> list[str]:
         """Returns the names of those who hold a zone."""
@@ -337,18 +356,20 @@ class Fleet(Crew[A]):
         """Collects a batch for each of several arms, and starts them at one instant when the block ends.
 
         The arms first finish what they have to do. Motions return as usual; `start` and `skew` of what this yields tell
-        how well it went.
+        how well it went. Guarded arms get all zones on their ways at once.
 
         Args:
             *names: Of the arms; all by default.
-            timeout: Seconds for the arms to finish what they do, and again for room in their queues.
+            timeout: Seconds for the arms to finish what they do, and again for zones, and for room in their queues.
 
         Raises:
+            MotionStopped: One of the arms was stopped since the block began.
+            ZoneDeadlock: The ways of two of the arms lead through one zone.
             DobotError: The batches could not be loaded or released; the arms were stopped.
         """
         seats = {name: self._seat(name) for name in names or self._seats}
         batches = {name: seat.family.batch(seat.arm) for name, seat in seats.items()}
-        together = Together(batches)
+        together, epochs = Together(batches), {name: seat.queue.epoch for name, seat in seats.items()}
         try:
             yield together
         except BaseException:
@@ -358,7 +379,7 @@ class Fleet(Crew[A]):
         commanded = {name: seat for name, seat in seats.items() if batches[name].motions}
         if commanded:
             try:
-                together.start = await launch(commanded, batches, timeout)
+                together.start = await Launch(commanded, batches, epochs, self._zones, check_timeout(timeout)).run()
             except BaseException:
                 abandon(batches)
                 raise

@@ -1,293 +1,360 @@
 """Keeps one arm out of zones that others hold: looks at each way before it is sent, and holds what is on it.
 
-    put --> way (paths) --> zones on it --claim--> sent --> done --> the zones that are behind are released
+    put --> plan (planner) --> zones on it --claim--> enter --> sent --> done --> the zones behind are released
 
-The arm holds a zone from before a motion into it is sent until the arm is known to be outside again, so that two
-guarded arms are never in one zone, whatever programs do. A way that is not known, as of homing, counts as through all
-zones that the arm can reach. What is looked at is the tool's place; `clearance` is for what is around it.
+1. The arm holds a zone from before a motion into it is sent until the arm is known to stand outside, so that two
+   guarded arms are never in one zone, whatever programs do.
+2. Where the arm may be is `standing`, the zones of all steps that have not ended, and everything in its reach while it
+   is on a way that is not known: homing, jogs, and what an earlier program has left in its queue.
+3. It is read from the arm alone, when no step is left and the arm has heard its stop and rests.
+4. An arm without anything to do is looked at again before its next motion: it may have been switched off, or led by
+   hand.
+
+What is looked at is the tool's place; `clearance` is for what is around it.
 """
 
 from __future__ import annotations
 
 import asyncio
-import math
 from collections import deque
-from collections.abc import AsyncIterator, Iterable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Generic, Literal, Protocol, TypeVar
 
 from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import DobotError
 from dobot_async.fleet.claims import Claim, Party
-from dobot_async.fleet.families import Family
-from dobot_async.fleet.frames import BaseFrame, Place
-from dobot_async.fleet.paths import STEP, XYZ, Lift, reach_of, way_of
-from dobot_async.fleet.shapes import Box
+from dobot_async.fleet.course import Course, Step
+from dobot_async.fleet.frames import BaseFrame
+from dobot_async.fleet.limits import Limits
+from dobot_async.fleet.paths import STEP
+from dobot_async.fleet.planner import Planner, Region, Stance
 from dobot_async.fleet.zones import Zones, here
-from dobot_async.magician import commands as c
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.kinematics import Joints
 
-__all__ = ["Guard", "Mode", "Step"]
+__all__ = ["Guard", "Mode"]
 
 Mode = Literal["off", "wait", "raise"]
-AT_REST = 0.5  # mm between two readings of an arm that stands
-BETWEEN_READINGS = 0.05
-ROUNDING = 0.01  # mm; what numbers lose on the line
+S = TypeVar("S", bound=Stance)
+BETWEEN_READINGS = 0.1  # seconds
+AT_REST = 0.05  # mm between two readings of an arm that stands; the slowest of jogs comes further
+ROUNDING = 0.1  # mm; what numbers lose on the line, and an arc bulges between two places
 
 
-@dataclass(eq=False, slots=True)
-class Step:
-    """One command on its way.
+class Stops(Protocol):
+    """The arm's queue, as far as the guard is concerned."""
 
-    Attributes:
-        motion: The command.
-        zones: What it leads through.
-        after: The zones in which it ends; None if that is not known.
+    async def stops_heard(self) -> None:
+        """Return when no stop goes on any more; raise ReplyTimeout if the arm does not hear it."""
+
+
+class Guard(Generic[S]):
+    """The guard of one arm.
+
+    Args:
+        steps: What the arm has to do.
+        planner: What is known of its ways.
+        queue: Its queue.
+        zones: Those of the cell.
+        party: As what it holds them.
+        base: Where it stands.
+        mode: What it does where another one holds a zone: "wait" or "raise".
+        clearance: mm around the tool.
+        limits: Where the tool may be at all.
     """
-
-    motion: Motion
-    zones: frozenset[str] = frozenset()
-    after: frozenset[str] | None = frozenset()
-
-
-class Guard:
-    """The guard of one arm."""
 
     def __init__(
         self,
         steps: deque[Step],
-        arm: Any,
-        family: Family,
+        planner: Planner[S],
+        queue: Stops,
         zones: Zones,
         party: Party,
         *,
         base: BaseFrame,
         mode: Mode,
         clearance: float,
-        limits: Box | None,
+        limits: Limits,
     ) -> None:
+        self.patient = mode == "wait"
         self._steps = steps
-        self._arm = arm
-        self._family = family
+        self._planner = planner
+        self._queue = queue
         self._zones = zones
         self._party = party
         self._base = base
-        self._mode = mode
-        self._margin = clearance + STEP / 2
+        self._margin = clearance + STEP / 2 + ROUNDING
         self._limits = limits
         self._claims: list[Claim] = []
-        self._joints: Joints | None = None
-        self._lifts: set[Lift] = set()
+        self._stance: S | None = None  # after all steps
         self._standing: frozenset[str] = frozenset()
+        self._inside: frozenset[str] = frozenset()  # those of them that it was really in when it was looked at last
         self._located = False
-        self._roaming = False
+        self._loose: list[frozenset[str]] = []  # where the arm may be by what is no step: jogs, leftovers, changes
+        self._mute = False  # whether it did not tell where it is when it was asked last
         self._looking = 0
         self._plans = 0
-        party.moving = lambda: bool(steps or self._roaming or self._looking)
+        party.moving = lambda: bool(steps or self._loose or self._looking)
 
-    async def admit(self, motions: Sequence[Motion], deadline: float | None) -> None:
-        """Returns when the arm may do what is to be sent together, and enters it.
+    @property
+    def holds(self) -> frozenset[str]:
+        """The zones that the arm is in, or has ahead."""
+        return frozenset().union(*(claim.zones for claim in self._claims))
+
+    async def plan(self, motions: Sequence[Motion]) -> Course[S]:
+        """Look at commands that are to be sent together; nothing is held yet.
 
         Raises:
-            ValueError: It leads out of the limits of the arm, or where the arm cannot go.
-            ZoneOccupied: Another holds a zone on the way, and this arm does not wait.
+            ValueError: They lead out of the limits of the arm, or where the arm cannot go.
+            DobotError: The arm does not say where it is.
+        """
+        moves = any(motion.moves for motion in motions)
+        if moves:
+            await self._be_sure()
+
+        stance, steps, changes = self._stance, [], False
+        for motion in motions:
+            value = motion.entry.value
+            plan = await self._planner.plan(value, stance) if motion.moves else self._planner.change(value, stance)
+            if plan is None:
+                steps.append(Step(motion))
+                continue
+
+            if motion.moves:
+                self._limits.check(plan.outline, stance.tool if stance else None)
+
+            changes = True
+            after = None if plan.end is None else self._zones_of(plan.end.region)
+            steps.append(Step(motion, self._zones_of(plan.region), after))
+            stance = plan.end
+
+        return Course(steps, stance, changes)
+
+    def enter(self, course: Course[S], claim: Claim | None) -> None:
+        """Take note that what was looked at is sent now, with a claim on its zones that was granted."""
+        if claim:
+            self._claims.append(claim)
+
+        self._steps.extend(course.steps)
+        for step in course.steps:
+            self._planner.begun(step.motion.entry.value)
+
+        if course.moves:
+            self._plans += 1
+            self._stance = course.end
+
+    async def claim(self, zones: frozenset[str], deadline: float | None) -> Claim | None:
+        """Wait for zones, or raise, as the mode says.
+
+        Raises:
+            ZoneOccupied: Another holds one of them, and this arm does not wait, or in vain.
             ZoneDeadlock: Waiting for it would never end.
             ReplyTimeout: Waiting took too long.
         """
-        moves = any(motion.moves for motion in motions)
-        if moves and not self._located:
-            self._forget()
-            if not self._steps:
-                await self.locate()
-
-        steps, joints = [], self._joints
-        for motion in motions:
-            step, joints = await self._plan(motion, joints)
-            steps.append(step)
-
-        zones = frozenset[str]().union(*(step.zones for step in steps))
-        if zones:
-            claim = await self._claim(zones, deadline)
-            self._claims.append(claim)
-
-        self._steps.extend(steps)
-        if moves:
-            self._plans += 1
-            self._joints = joints
-
-    @asynccontextmanager
-    async def roaming(self) -> AsyncIterator[None]:
-        """While this is entered, the arm may go anywhere."""
-        claim = await self._claim(self._anywhere(), None)
-        self._claims.append(claim)
-        self._roaming = True
-        self.unsure()
-        try:
-            yield
-        finally:
-            self._roaming = False
-            await self.catch_up()
-
-    async def catch_up(self) -> None:
-        """Takes note of all that is known to have ended: what it held may be what is asked for next."""
-        with suppress(DobotError):
-            while self._steps and self._steps[0].motion.done:
-                step = self._steps[0]
-                try:
-                    await step.motion
-                except DobotError:
-                    await self.lost()
-                else:
-                    await self.done(step)
-
-            if not (self._located or self._steps or self._roaming):
-                await self.locate()
-
-    async def done(self, step: Step) -> None:
-        """Takes note that a step is done."""
-        if step not in self._steps:
-            return
-
-        self._steps.remove(step)
-        if step.motion.moves:
-            self._located = step.after is not None
-            self._standing = self._anywhere() if step.after is None else step.after
-
-        if not (self._located or self._steps):
-            await self.locate()
-
-        self._settle()
-
-    def unsure(self) -> None:
-        """Takes note that the arm is stopped, somewhere on its way."""
-        self._located, self._joints = False, None
-        self._plans += 1
-
-    async def lost(self) -> None:
-        """Takes note that the first step has failed."""
-        self._forget()
-        if not self._steps:
-            await self.locate()
-
-    async def locate(self) -> None:
-        """Finds out where the arm stands once it does; raises DobotError if it does not tell."""
-        plans = self._plans
-        self._looking += 1
-        try:
-            place = await self._rest()
-            joints = await self._read_joints()
-        finally:
-            self._looking -= 1
-
-        if plans == self._plans:
-            self._joints, self._located = joints, True
-            self._standing = frozenset(self._around([place[:3]]))
-            self._settle()
-
-    async def _rest(self) -> Place:
-        """Where the arm stands, once it does."""
-        before = await self._family.place(self._arm)
-        while True:
-            await asyncio.sleep(BETWEEN_READINGS)
-            place = await self._family.place(self._arm)
-            if math.dist(before[:3], place[:3]) < AT_REST:
-                return place
-
-            before = place
-
-    def _forget(self) -> None:
-        """Drops steps that have failed; the arm may be anywhere on their way."""
-        while self._steps and self._steps[0].motion.ended:
-            self._standing |= self._steps.popleft().zones
-
-    async def _read_joints(self) -> Joints | None:
-        """The joints of an arm whose kinematics are known."""
-        if not isinstance(self._arm, Magician):
+        program = here()
+        self._zones.drive(self._party.name, program)
+        if not zones:
             return None
 
-        pose = await self._arm.get_pose()
-        return Joints(pose.j1, pose.j2, pose.j3, pose.j4)
-
-    async def _plan(self, motion: Motion, joints: Joints | None) -> tuple[Step, Joints | None]:
-        """What a command leads through, and the joints at its end; both of them as far as they are known."""
-        value = motion.entry.value
-        if isinstance(value, (c.PTPJumpParams, c.PTPJump2Params)):
-            self._lifts.add(lift_of(value))
-
-        if not motion.moves:
-            return Step(motion), joints
-
-        way = None
-        if joints and isinstance(self._arm, Magician):
-            way = way_of(value, joints, self._arm.kinematics, await self._lifts_for(value))
-
-        if way is None:
-            return Step(motion, self._anywhere(), None), None
-
-        self._check_limits(way.places)
-        last = self._arm.kinematics.forward(*way.end)[:3]
-        return Step(motion, frozenset(self._around(way.places)), frozenset(self._around([last]))), way.end
-
-    async def _lifts_for(self, value: Any) -> list[Lift]:
-        """The lifts that a jump may have."""
-        if getattr(value, "ptp_mode", None) not in JUMPS:
-            return []
-
-        set_last = [
-            lift_of(await self._arm.request(c.GET_PTP_JUMP_PARAMS, None)),
-            lift_of(await self._arm.request(c.GET_PTP_JUMP2_PARAMS, None)),
-        ]
-        return [*set_last, *self._lifts]
-
-    def _around(self, places: Iterable[XYZ]) -> set[str]:
-        """The zones at some places of the arm."""
-        found: set[str] = set()
-        for place in places:
-            x, y, z, _ = self._base.to_cell(*place)
-            found |= self._zones.around(x, y, z, self._margin)
-
-        return found
-
-    def _anywhere(self) -> frozenset[str]:
-        """The zones that the arm may come into on a way that is not known."""
-        reach = math.inf
-        if isinstance(self._arm, Magician):
-            reach = reach_of(self._arm.kinematics) + self._margin
-
-        return self._zones.near(self._base.x, self._base.y, reach)
-
-    def _check_limits(self, places: Iterable[XYZ]) -> None:
-        """Raises ValueError if a way leaves the arm's limits."""
-        for place in places if self._limits else ():
-            x, y, z, _ = self._base.to_cell(*place)
-            if self._limits and not self._limits.contains(x, y, z, ROUNDING):
-                raise ValueError(
-                    f"{self._party.name}: the way leaves the arm's limits, at ({x:.1f}, {y:.1f}, {z:.1f}) of the cell"
-                )
-
-    async def _claim(self, zones: frozenset[str], deadline: float | None) -> Claim:
-        """Waits for zones, or raises, as the mode says."""
-        program = here()
-        self._zones.drivers[self._party.name] = program.task
         # Only its own programs let it in: two arms that one program moves must not meet, either.
         own = frozenset(each.party for each in program.line()) | {self._party}
         claim = Claim(
             self._party,
             own,
             zones,
-            patient=self._mode == "wait",
+            patient=self.patient,
             stuck=self._zones.driven(program),
             asker=program.party,
+            parked=self._zones.parked(program),
         )
         left = None if deadline is None else max(0.0, deadline - asyncio.get_running_loop().time())
         return await self._zones.claim(claim, left)
 
+    @asynccontextmanager
+    async def roaming(self) -> AsyncIterator[None]:
+        """While this is entered, the arm may go anywhere."""
+        claim = await self.claim(self._anywhere(), None)
+        async with self._astray(claim):
+            yield
+
+    @asynccontextmanager
+    async def changing(self, value: object) -> AsyncIterator[None]:
+        """While this is entered, something that ways depend on changes at once, such as the end effector.
+
+        What was looked at before, and has not ended, may lead anywhere then.
+        """
+        moving = any(step.motion.moves and not step.motion.ended for step in self._steps)
+        if not moving:
+            await self._be_sure()
+
+        plan = self._planner.change(value, None if moving else self._stance)
+        if plan is None:
+            yield
+            return
+
+        claim = await self.claim(self._zones_of(plan.region), None)
+        self._planner.begun(value)
+        async with self._astray(claim):
+            for step in self._steps:
+                if step.motion.moves:
+                    step.zones, step.after = self._anywhere(), None
+
+            yield
+
+    async def glimpse(self) -> None:
+        """Take the arm to go anywhere in its reach, from now on until `until` has ended."""
+        await self._planner.look()
+        self._loose.append(self._anywhere())
+        self.unsure()
+        self._settle()
+
+    async def until(self, leftovers: Callable[[], Awaitable[None]]) -> None:
+        """Wait until the arm has done what an earlier program has left behind, and find out where it stands then."""
+        with suppress(DobotError):
+            await leftovers()
+
+        self._standing |= self._loose.pop()
+        await self.catch_up()
+
+    async def catch_up(self) -> None:
+        """Take note of all that is known to have ended: what it held may be what is asked for next."""
+        with suppress(DobotError):
+            while self._steps and self._steps[0].motion.ended:
+                step = self._steps[0]
+                if step.motion.exception():
+                    await self.lost()
+                else:
+                    await self.done(step)
+
+            if not (self._located or self._busy or (self._mute and self._party.failure)):
+                await self.locate()
+
+    async def done(self, step: Step) -> None:
+        """Take note that a step is done."""
+        if step not in self._steps:
+            return
+
+        self._steps.remove(step)
+        if step.after is not None:
+            self._standing, self._located = step.after, True
+        elif step.motion.moves or step.zones:
+            self._standing |= step.zones
+            self._located = False
+
+        if not (self._located or self._busy):
+            await self.locate()
+
+        self._settle()
+
+    def unsure(self) -> None:
+        """Take note that the arm is stopped, somewhere on its way."""
+        self._located, self._stance = False, None
+        self._plans += 1
+
+    async def lost(self) -> None:
+        """Take note that the first step has failed: the arm may be anywhere on the way of those that have."""
+        self._forget()
+        if not self._busy:
+            await self.locate()
+
+    async def locate(self) -> None:
+        """Find out where the arm stands once it does; raise DobotError if it does not tell."""
+        plans = self._plans
+        self._looking += 1
+        self._mute = True
+        try:
+            await self._queue.stops_heard()
+            await self._rest()
+            stance = await self._planner.look()
+        finally:
+            self._looking -= 1
+
+        self._mute = False
+        if plans == self._plans and not self._loose:
+            self._planner.settled(stance)
+            self._stance, self._located = stance, True
+            self._standing = self._zones_of(stance.region)
+            self._inside = stance.region.zones(self._zones, self._base, ROUNDING)
+            self._settle()
+
+    async def watch_limits(self) -> str:
+        """Return why a jog has to end: the tool is about to leave the limits."""
+        return await self._limits.watch(self._planner.tool)
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether there are limits."""
+        return self._limits.box is not None
+
+    @property
+    def _busy(self) -> bool:
+        """Whether the arm has something to do, so that where it stands says little."""
+        return bool(self._steps or self._loose)
+
+    async def _be_sure(self) -> None:
+        """Know where the arm stands, if it has nothing to do; it may have moved since it was looked at last."""
+        if not self._located:
+            self._forget()
+        elif not self._busy:
+            plans, seen = self._plans, await self._planner.look()
+            if plans == self._plans and self._stance and self._stance.near(seen):
+                self._planner.settled(seen)
+                self._stance = seen
+            else:
+                self.unsure()
+
+        if not (self._located or self._busy):
+            await self.locate()
+
+    @asynccontextmanager
+    async def _astray(self, claim: Claim | None) -> AsyncIterator[None]:
+        """While this is entered, the arm may be wherever a claim lets it, and its stance is not known."""
+        if claim:
+            self._claims.append(claim)
+
+        zones = claim.zones if claim else frozenset[str]()
+        self._loose.append(zones)
+        self.unsure()
+        try:
+            yield
+        finally:
+            self._loose.remove(zones)
+            self._standing |= zones
+            self.unsure()
+            await self.catch_up()
+
+    async def _rest(self) -> None:
+        """Return when the tool stands."""
+        before = await self._planner.tool()
+        while True:
+            await asyncio.sleep(BETWEEN_READINGS)
+            now = await self._planner.tool()
+            if all(abs(a - b) < AT_REST for a, b in zip(before, now, strict=True)):
+                return
+
+            before = now
+
+    def _forget(self) -> None:
+        """Drop steps that have failed; the arm may be anywhere on their way."""
+        while self._steps and self._steps[0].motion.ended:
+            self._standing |= self._steps.popleft().zones
+
+    def _anywhere(self) -> frozenset[str]:
+        """The zones in its reach."""
+        return self._zones_of(self._planner.reach(self._stance))
+
+    def _zones_of(self, region: Region) -> frozenset[str]:
+        """The zones in a region."""
+        return region.zones(self._zones, self._base, self._margin)
+
     def _settle(self) -> None:
-        """Holds what the arm is in or has ahead, and nothing else."""
-        needed = self._standing.union(*(step.zones for step in self._steps))
-        missing = needed.difference(*(claim.zones for claim in self._claims))
+        """Hold what the arm is in or has ahead, and nothing else.
+
+        A zone that another arm holds is not taken by who is only near it: who holds a zone may move in it.
+        """
+        ahead = frozenset[str]().union(*self._loose, *(step.zones for step in self._steps))
+        others = (claim.zones for claim in self._zones.claims.held if claim.party is not self._party)
+        needed = ahead | self._standing
+        missing = (ahead | self._inside & self._standing | self._standing.difference(*others)) - self.holds
         if missing:
             claim = Claim(self._party, frozenset([self._party]), missing)
             self._claims.append(claim)
@@ -295,14 +362,3 @@ class Guard:
 
         self._zones.claims.keep(self._claims, needed)
         self._claims = [claim for claim in self._claims if claim.zones]
-
-
-JUMPS = (c.PTPMode.JUMP_XYZ, c.PTPMode.JUMP_ANGLE, c.PTPMode.JUMP_MOVL_XYZ)
-
-
-def lift_of(value: c.PTPJumpParams | c.PTPJump2Params) -> Lift:
-    """What the parameters of jumps say."""
-    if isinstance(value, c.PTPJumpParams):
-        return Lift(value.jump_height, value.jump_height, value.z_limit)
-
-    return Lift(value.start_jump_height, value.end_jump_height, value.z_limit)

@@ -4,60 +4,28 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager, nullcontext, suppress
-from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import anyio
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
+from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.contract import LinkState
-from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout, another
-from dobot_async.fleet.claims import Party, Pause
-from dobot_async.fleet.families import Family, FleetQueue, family_of
-from dobot_async.fleet.frames import BaseFrame
-from dobot_async.fleet.guard import Guard, Mode, Step
-from dobot_async.fleet.shapes import Box
+from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
+from dobot_async.fleet.claims import Claim, Party, Pause
+from dobot_async.fleet.course import Course, Step
+from dobot_async.fleet.families import Family, family_of
+from dobot_async.fleet.guard import Guard
+from dobot_async.fleet.limits import Limits
+from dobot_async.fleet.member import Member
+from dobot_async.fleet.queue import FleetArm, FleetQueue
 from dobot_async.fleet.work import named
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Member", "Seat", "tell_to_stop"]
-
-A = TypeVar("A")
-
-
-@dataclass(frozen=True)
-class Member(Generic[A]):
-    """An arm that is to be in a fleet.
-
-    Attributes:
-        url: Where it is.
-        kind: Its class: Magician, MyCobot or UltraArm.
-        options: What `connect` of its class takes beside the URL, such as {"model": "myarm300"}.
-        base: Where it stands in the cell.
-        group: The name of its group; None for the whole fleet.
-        guard: "wait" lets its motions wait for zones that others hold, "raise" refuses them, "off" looks at none.
-        clearance: mm around the tool that have to stay out of such zones.
-        limits: Where in the cell its tool may be at all; None leaves it to the arm.
-    """
-
-    url: str
-    kind: type[A]
-    options: Mapping[str, Any] = field(default_factory=dict)
-    base: BaseFrame = field(default_factory=BaseFrame)
-    group: str | None = None
-    guard: Mode = "off"
-    clearance: float = 0.0
-    limits: Box | None = None
-
-    def __post_init__(self) -> None:
-        family = family_of(self.kind)
-        if self.guard not in {"off", "wait", "raise"} or not self.clearance >= 0:
-            raise ValueError('expected guard "off", "wait" or "raise", and clearance >= 0')
-
-        if self.limits and (family.name != "magician" or self.guard == "off"):
-            raise ValueError("limits are kept by the guard, and of a Magician alone: the ways of others are not known")
 
 
 def tell_to_stop(seats: Iterable[Seat]) -> None:
@@ -92,18 +60,16 @@ class Seat:
         self.member = member
         self.family: Family = family_of(member.kind)
         self.party = zones.arms[name]
-        self.arm: Any = None
+        self.arm: Any = None  # a FleetArm, and what its user takes it for
         self.stopped: DobotError | None = None
         self.commands = self.stops_on_error = False
         self._zones = zones
         self._failed = failed
         self._works = works
-        self._guard: Guard | None = None
+        self._guard: Guard[Any] | None = None
         self._steps: deque[Step] = deque()
         self._order = anyio.Lock(fast_acquire=True)
         self._commanding: tuple[Party, ...] = ()
-        self._halts = 0
-        self._halted: DobotError = MotionStopped("the arm was stopped")
         self._halting: Any = None  # the frame that stops the arm, ready to be sent
         self._quiet = False
         self._tasks: set[asyncio.Task[None]] = set()
@@ -112,11 +78,10 @@ class Seat:
     @property
     def queue(self) -> FleetQueue:
         """The arm's queue."""
-        queue = self.arm.queue
-        assert isinstance(queue, FleetQueue)
-        return queue
+        arm: FleetArm = self.arm
+        return arm.queue
 
-    async def begin(self, arm: Any, options: Mapping[str, Any]) -> None:
+    async def begin(self, arm: FleetArm, options: Mapping[str, Any]) -> None:
         """Takes an arm that was just connected, with these options."""
         self.arm = arm
         member = self.member
@@ -126,19 +91,24 @@ class Seat:
             self._halting = arm.link.frame(self.family.stop, None)
 
         if member.guard != "off":
-            self._guard = Guard(
+            self._guard = guard = Guard(
                 self._steps,
-                arm,
-                self.family,
+                self.family.planner(arm, member.rail),
+                arm.queue,
                 self._zones,
                 self.party,
                 base=member.base,
                 mode=member.guard,
                 clearance=member.clearance,
-                limits=member.limits,
+                limits=Limits(self.name, member.limits, member.base),
             )
-            await self._guard.locate()
-            self._zones.guards.append(self._guard.catch_up)
+            if options.get("queue") == "keep" and self.commands:
+                await guard.glimpse()
+                self._spawn(guard.until(lambda: self.family.leftovers(arm)), "leftovers")
+            else:
+                await guard.locate()
+
+            self._zones.guards.append(guard.catch_up)
 
         self.queue.overseer = self
         if arm.link.state.value is LinkState.LOST:  # when its queue could not tell yet
@@ -155,12 +125,14 @@ class Seat:
         return set(self._tasks)
 
     @asynccontextmanager
-    async def admitted(self, motions: Sequence[Motion], timeout: float | None) -> AsyncIterator[float | None]:
+    async def admitted(
+        self, motions: Sequence[Motion], timeout: float | None, epoch: Epoch
+    ) -> AsyncIterator[float | None]:
         """While this is entered, motions may be sent. Yields the seconds that are left for it."""
         loop = asyncio.get_running_loop()
         deadline = None if timeout is None else loop.time() + timeout
         try:
-            await self._admit(motions, deadline)
+            await self._admit(motions, deadline, epoch)
         except BaseException as error:
             reason = error if isinstance(error, DobotError) else MotionStopped(f"it was not sent: {error}")
             for motion in motions:
@@ -171,24 +143,57 @@ class Seat:
         try:
             yield None if deadline is None else max(0.0, deadline - loop.time())
         finally:
-            self._order.release()
-            self.follow()
+            self.end_turn()
 
     @asynccontextmanager
-    async def roaming(self) -> AsyncIterator[None]:
-        """While this is entered, the arm may go anywhere."""
-        self.check()
-        await self._take_turn()
-        try:
-            async with self._guard.roaming() if self._guard else nullcontext():
+    async def roaming(self, halt: Callable[[], Awaitable[None]] | None) -> AsyncIterator[None]:
+        """While this is entered, the arm may go anywhere, but for its limits, where it is stopped."""
+        guard = self._guard
+        async with self._turn():
+            if guard is None:
                 yield
+                return
+
+            if halt is None or not guard.is_limited:
+                async with guard.roaming():
+                    yield
+
+                return
+
+            async with guard.roaming():
+                watch = self._spawn(halted_at_limits(guard, halt), "limits")
+                try:
+                    yield
+                finally:
+                    await cancel_and_join(watch)
+
+            if not watch.cancelled():
+                raise MotionStopped(f"{self.name} was stopped in its jog: {watch.result()}")
+
+    @asynccontextmanager
+    async def changing(self, value: object) -> AsyncIterator[None]:
+        """While this is entered, something changes at once on which the arm's ways depend."""
+        if self._guard is None:
+            yield
+            return
+
+        async with self._turn(), self._guard.changing(value):
+            yield
+
+    @asynccontextmanager
+    async def _turn(self) -> AsyncIterator[None]:
+        """While this is entered, nobody else commands the arm; raises MotionStopped if it was stopped meanwhile."""
+        self.check()
+        epoch = self.queue.epoch
+        await self.take_turn(None)
+        try:
+            epoch.check()
+            yield
         finally:
-            self._order.release()
+            self.end_turn()
 
     def ended(self, error: DobotError) -> None:
         """Takes note of what ends all motions of the arm; whatever is no stop is a failure."""
-        self._halts += 1
-        self._halted = error
         if self._guard:
             self._guard.unsure()
 
@@ -197,13 +202,11 @@ class Seat:
             named(self.name, error)
             self._failed(self, error)
 
-    def check(self, halts: int | None = None) -> None:
-        """Raises MotionStopped if the arm may not move, and the reason of its last stop if it had fewer before."""
+    def check(self) -> None:
+        """Raises MotionStopped if the arm, or the program that asks, may not move any more."""
+        here().check()
         if self.stopped:
             raise MotionStopped(f"{self.stopped}; the fleet stays stopped until fleet.recover()")
-
-        if halts is not None and halts != self._halts:
-            raise another(self._halted)
 
     def tell_to_stop(self) -> None:
         """Writes a stop before this returns, if the link can; nobody waits for its answer."""
@@ -212,8 +215,11 @@ class Seat:
                 self.arm.link.send_nowait(self._halting)
 
     def begin_stop(self, error: DobotError) -> asyncio.Task[None]:
-        """Ends all Motions with an error; returns the task that tells the arm to stop until it has heard it."""
-        return self.queue.begin_stop(error)
+        """Ends all Motions with an error; returns the task that tells the arm to stop until it has heard it.
+
+        The caller is told of it, and so the queue's `join` is not.
+        """
+        return self.queue.begin_own_stop(error)
 
     async def stop_heard(self, stop: asyncio.Task[None]) -> str:
         """Waits for what `begin_stop` has begun, for so long as one does on the way out of a block.
@@ -244,39 +250,71 @@ class Seat:
         if self._steps and not self._quiet and (self._follower is None or self._follower.done()):
             self._follower = self._spawn(self._follow(), "follower")
 
-    async def _admit(self, motions: Sequence[Motion], deadline: float | None) -> None:
-        """Takes the lock of the order, and returns when motions may be sent."""
-        self.check()
-        halts = self._halts
-        try:
-            async with asyncio.timeout_at(deadline):
-                await self._take_turn()
-        except TimeoutError:
-            raise ReplyTimeout(f"{self.name}: others were before it, and took too long") from None
+    async def take_turn(self, deadline: float | None) -> None:
+        """Takes the lock of the order: nobody else commands the arm until `end_turn`.
 
-        try:
-            if self._guard:
-                await self._guard.admit(motions, deadline)
-            else:
-                self._steps.extend(Step(motion) for motion in motions)
-
-            self.check(halts)
-        except BaseException:
-            self._order.release()
-            self.follow()
-            raise
-
-        self._works(self)
-
-    async def _take_turn(self) -> None:
-        """Takes the lock of the order; raises ZoneDeadlock if who has it waits, in the end, for who asks."""
+        Raises:
+            ZoneDeadlock: Who has it waits, in the end, for who asks.
+            ReplyTimeout: Others took too long.
+        """
         program = here()
         stuck = self._zones.driven(program) | {program.party}
         turn = Pause(f"to command {self.name} behind", program.party, stuck, lambda: self._commanding)
-        with self._zones.claims.pausing(turn) if self._order.locked() else nullcontext():
-            await self._order.acquire()
+        try:
+            async with asyncio.timeout_at(deadline):
+                with self._zones.claims.pausing(turn) if self._order.locked() else nullcontext():
+                    await self._order.acquire()
+        except TimeoutError:
+            raise ReplyTimeout(f"{self.name}: others were before it, and took too long") from None
 
         self._commanding = (program.party,)
+
+    def end_turn(self) -> None:
+        """Lets others command the arm, and watches to its end what it was told."""
+        self._order.release()
+        self.follow()
+
+    async def plan(self, motions: Sequence[Motion]) -> Course[Any]:
+        """Looks at what is to be sent together; see `Guard.plan`."""
+        if self._guard:
+            return await self._guard.plan(motions)
+
+        return Course([Step(motion) for motion in motions], None, moves=False)
+
+    def enter(self, course: Course[Any], claim: Claim | None) -> None:
+        """Takes note of what is sent now, with the claim on its zones."""
+        if self._guard:
+            self._guard.enter(course, claim)
+        else:
+            self._steps.extend(course.steps)
+
+        self._works(self)
+
+    @property
+    def guard(self) -> Guard[Any] | None:
+        """What keeps the arm out of zones that others hold, if anything does."""
+        return self._guard
+
+    async def _admit(self, motions: Sequence[Motion], deadline: float | None, epoch: Epoch) -> None:
+        """Takes the lock of the order, and returns when motions may be sent."""
+        self.check()
+        await self.take_turn(deadline)
+        try:
+            course = await self.plan(motions)
+            claim = await self._guard.claim(course.zones, deadline) if self._guard else None
+            try:
+                self.check()
+                epoch.check()
+            except BaseException:
+                if claim:
+                    self._zones.claims.release(claim)
+
+                raise
+
+            self.enter(course, claim)
+        except BaseException:
+            self.end_turn()
+            raise
 
     async def _follow(self) -> None:
         """Takes the steps as their motions end."""
@@ -296,3 +334,10 @@ class Seat:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
+
+
+async def halted_at_limits(guard: Guard[Any], halt: Callable[[], Awaitable[None]]) -> str:
+    """Stops a jog before the tool leaves the limits, and returns why it was stopped."""
+    why = await guard.watch_limits()
+    await halt()
+    return why

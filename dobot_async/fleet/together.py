@@ -1,6 +1,9 @@
 """Batches on several arms that start at one instant.
 
-    join what they do --> measure each link --> pause --> load --> release each, earlier by what its link takes --> skew
+    join --> claim --> measure --> pause --> load --> release each, earlier by what its link takes --> rest --> skew
+
+Nobody else commands the arms meanwhile, and each step is bound to the epochs in which the block began: a stop of one of
+the arms ends the start of all.
 
 An arm begins about half a round trip after its release was sent, and tells so half a round trip later. So the releases
 are sent half a round trip before the common instant, and the start that is reported lies in the middle between release
@@ -13,16 +16,28 @@ import asyncio
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import MotionStopped, another
+from dobot_async.fleet.admission import admit_together, turns
 from dobot_async.fleet.seat import Seat, tell_to_stop
 from dobot_async.fleet.work import on_the_way_out, side_by_side
+from dobot_async.fleet.zones import Zones
 
-__all__ = ["Start", "Together", "abandon", "launch"]
+__all__ = ["Launch", "Start", "Together", "abandon"]
 
-B = TypeVar("B")
+
+class Collected(Protocol):
+    """A batch, as far as its start is concerned."""
+
+    @property
+    def motions(self) -> list[Motion]:
+        """What it has collected."""
+
+
+B = TypeVar("B", bound=Collected)
 SAMPLES = 7
 LEAD = 0.003  # seconds from the decision to the first release, for all to be ready to send
 
@@ -86,67 +101,119 @@ class Together(Generic[B]):
         )
 
 
-async def wait_for(batch: Any) -> None:
+async def wait_for(batch: Collected) -> None:
     """Waits for all motions of a batch."""
     for motion in list(batch.motions):
         await motion
 
 
-def abandon(batches: Mapping[str, Any]) -> None:
+def abandon(batches: Mapping[str, Collected]) -> None:
     """Ends the Motions of batches that were not sent."""
     for batch in batches.values():
         for motion in batch.motions:
-            motion.end(MotionStopped("it was not sent: the block that starts the arms together was left by an error"))
+            if motion.call is None:
+                motion.end(MotionStopped("it was not sent: the block that starts the arms together ended by an error"))
 
 
-async def launch(seats: Mapping[str, Seat], batches: Mapping[str, Any], timeout: float | None) -> Start:
-    """Loads batches, and starts them at one instant; a failure or a cancellation lets none of them go on.
+@dataclass(frozen=True, slots=True)
+class Launch:
+    """A start under way.
 
-    Raises:
-        DobotError: As `put_all` does; the arms were stopped.
+    Attributes:
+        seats: The arms.
+        batches: What each is to do.
+        epochs: Those of the arms in which the block began.
+        zones: The zones of the cell.
+        timeout: Seconds for the arms to finish what they do, for the zones, and for room in their queues.
     """
-    for seat in seats.values():
-        seat.check()
 
-    await side_by_side({name: seat.queue.join(timeout) for name, seat in seats.items()})
-    latency = await side_by_side({name: measure(seat) for name, seat in seats.items()})
-    try:
-        return await start(seats, batches, latency, timeout)
-    except BaseException as error:
-        await on_the_way_out(error, give_up(seats))
-        raise
+    seats: Mapping[str, Seat]
+    batches: Mapping[str, Collected]
+    epochs: Mapping[str, Epoch]
+    zones: Zones
+    timeout: float | None
 
+    def check(self) -> None:
+        """Raises MotionStopped if one of the arms was stopped since the block began."""
+        for name, seat in self.seats.items():
+            seat.check()
+            self.epochs[name].check()
 
-async def start(
-    seats: Mapping[str, Seat], batches: Mapping[str, Any], latency: Mapping[str, float], timeout: float | None
-) -> Start:
-    """Loads what the arms take while they are paused, starts them, and sends the rest."""
-    for seat in seats.values():
-        seat.quiet(True)
+    async def run(self) -> Start:
+        """Loads the batches, and starts them at one instant; a failure or a cancellation lets none of them go on.
 
-    try:
-        pausing = {name: seat for name, seat in seats.items() if seat.family.pauses}
-        await side_by_side({name: seat.queue.pause() for name, seat in pausing.items()})
-        rooms = await side_by_side({name: room(seat) for name, seat in pausing.items()})
-        first, rest = {}, {}
-        for name in seats:
-            motions = batches[name].motions
-            loaded = max(1, rooms.get(name, 1) - 1)
-            first[name], rest[name] = motions[:loaded], motions[loaded:]
+        Raises:
+            DobotError: As `put_all` does; the arms were stopped.
+        """
+        seats = self.seats
+        self.check()
+        async with turns(seats):
+            self.check()
+            await side_by_side({name: seat.queue.join(self.timeout) for name, seat in seats.items()})
+            self.check()
+            motions = {name: self.batches[name].motions for name in seats}
+            for seat in seats.values():
+                seat.quiet(True)  # what is admitted cannot be watched before it is sent
 
-        await side_by_side({name: seat.queue.put_all(first[name], timeout=timeout) for name, seat in pausing.items()})
-        instant = asyncio.get_running_loop().time() + LEAD + max(latency.values())
-        told = await side_by_side(
-            {name: release(seat, instant - latency[name], first[name]) for name, seat in seats.items()}
-        )
-    finally:
-        for seat in seats.values():
+            try:
+                await admit_together(seats, motions, self.zones, self.timeout)
+                self.check()
+                latency = await side_by_side({name: measure(seat) for name, seat in seats.items()})
+                return await self._start(latency)
+            except BaseException as error:
+                abandon(self.batches)  # before anybody watches them
+                await on_the_way_out(error, give_up(seats))
+                raise
+            finally:
+                self._watch()
+
+    async def _start(self, latency: Mapping[str, float]) -> Start:
+        """Loads what the arms take while they are paused, starts them, and sends the rest."""
+        seats = self.seats
+        try:
+            pausing = {name: seat for name, seat in seats.items() if seat.family.pauses}
+            await side_by_side({name: seat.queue.pause() for name, seat in pausing.items()})
+            rooms = await side_by_side({name: room(seat) for name, seat in pausing.items()})
+            first, rest = {}, {}
+            for name in seats:
+                motions = self.batches[name].motions
+                loaded = max(1, rooms.get(name, 1) - 1)
+                first[name], rest[name] = motions[:loaded], motions[loaded:]
+
+            await side_by_side({name: self._put(name, first[name]) for name in pausing})
+            self.check()
+            instant = asyncio.get_running_loop().time() + LEAD + max(latency.values())
+            told = await side_by_side(
+                {name: self._release(name, instant - latency[name], first[name]) for name in seats}
+            )
+        finally:
+            self._watch()
+
+        await side_by_side({name: self._put(name, more) for name, more in rest.items() if more})
+        at = {name: (sent + answered) / 2 for name, (sent, answered) in told.items()}
+        return Start(at, latency, max(answered - sent for sent, answered in told.values()) / 2)
+
+    def _watch(self) -> None:
+        """Has the arms watched again."""
+        for seat in self.seats.values():
             seat.quiet(False)
 
-    more = {name: seat for name, seat in seats.items() if rest[name]}
-    await side_by_side({name: seat.queue.put_all(rest[name], timeout=timeout) for name, seat in more.items()})
-    at = {name: (sent + answered) / 2 for name, (sent, answered) in told.items()}
-    return Start(at, latency, max(answered - sent for sent, answered in told.values()) / 2)
+    async def _put(self, name: str, motions: Sequence[Motion]) -> None:
+        """Sends motions that were admitted."""
+        await self.seats[name].queue.put_admitted(motions, self.timeout, self.epochs[name])
+
+    async def _release(self, name: str, when: float, motions: Sequence[Motion]) -> tuple[float, float]:
+        """Starts one arm at a time; returns when that was sent, and when it was answered."""
+        loop = asyncio.get_running_loop()
+        await asyncio.sleep(when - loop.time())
+        self.check()
+        sent = loop.time()
+        if self.seats[name].family.pauses:
+            await self.seats[name].queue.resume()
+        else:
+            await self._put(name, motions)
+
+        return sent, loop.time()
 
 
 async def room(seat: Seat) -> int:
@@ -164,19 +231,6 @@ async def measure(seat: Seat) -> float:
         trips.append(loop.time() - asked)
 
     return statistics.median(trips) / 2
-
-
-async def release(seat: Seat, when: float, motions: Sequence[Motion]) -> tuple[float, float]:
-    """Starts one arm at a time; returns when that was sent, and when it was answered."""
-    loop = asyncio.get_running_loop()
-    await asyncio.sleep(when - loop.time())
-    sent = loop.time()
-    if seat.family.pauses:
-        await seat.queue.resume()
-    else:
-        await seat.queue.put_all(motions)
-
-    return sent, loop.time()
 
 
 async def give_up(seats: Mapping[str, Seat]) -> list[str]:

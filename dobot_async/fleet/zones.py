@@ -12,7 +12,9 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iter
 from contextlib import asynccontextmanager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from weakref import WeakSet
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async.errors import DobotError, ReplyTimeout, another
 from dobot_async.fleet.claims import Claim, Claims, Party
 from dobot_async.fleet.shapes import Shape
@@ -26,9 +28,11 @@ class Run:
 
     Attributes:
         parties: As what they hold zones, by name.
+        alive: The names of those that have not ended.
     """
 
     parties: Mapping[str, Party]
+    alive: set[str] = field(default_factory=set)
 
 
 @dataclass(eq=False)
@@ -41,6 +45,7 @@ class Program:
         parent: The program that started it.
         arm: The arm that it is the program of, if it is.
         run: The programs that run beside it, if it is one of several.
+        epoch: That of the fleet in which it began; None for a task that the fleet has not begun.
     """
 
     party: Party
@@ -48,6 +53,18 @@ class Program:
     parent: Program | None = None
     arm: str | None = None
     run: Run | None = None
+    epoch: Epoch | None = None
+
+    def check(self) -> None:
+        """Raises MotionStopped if the fleet was stopped since it, or one that it acts for, began."""
+        for program in self.line():
+            if program.epoch:
+                program.epoch.check()
+
+    def go_on(self, epoch: Epoch) -> None:
+        """Takes note that it has stopped the fleet itself, and so knows of it."""
+        for program in self.line():
+            program.epoch = program.epoch and epoch
 
     def line(self) -> Iterator[Program]:
         """Yields it and those that it acts for."""
@@ -95,7 +112,7 @@ class Zones:
         arms: The parties of the arms.
         claims: Who holds what.
         guards: To be called before a claim is judged: what has ended meanwhile is released.
-        drivers: Which task has moved an arm last.
+        drivers: Which task has moved an arm last; None if it has ended.
     """
 
     shapes: Mapping[str, Shape | None]
@@ -103,6 +120,7 @@ class Zones:
     claims: Claims = field(default_factory=Claims)
     guards: list[Callable[[], Awaitable[None]]] = field(default_factory=list)
     drivers: dict[str, asyncio.Task[object] | None] = field(default_factory=dict)
+    _watched: WeakSet[asyncio.Task[object]] = field(default_factory=WeakSet)
 
     def near(self, x: float, y: float, reach: float) -> frozenset[str]:
         """Returns the zones that are at most so far from a vertical line of the cell."""
@@ -111,6 +129,41 @@ class Zones:
     def around(self, x: float, y: float, z: float, margin: float) -> set[str]:
         """Returns the zones that a place of the cell is in, or nearer to than `margin`."""
         return {name for name, shape in self.shapes.items() if shape and shape.contains(x, y, z, margin)}
+
+    def drive(self, arm: str, program: Program) -> None:
+        """Takes note that a program moves an arm."""
+        self.drivers[arm] = task = program.task
+        if task and task not in self._watched:
+            self._watched.add(task)
+            task.add_done_callback(self._ended)
+
+    def parked(self, program: Program) -> Callable[[Party], bool]:
+        """Returns what tells of an arm that stands whether nobody is left who would move it while a program waits.
+
+        That can be told in a run alone: whoever has begun it waits for its end.
+        """
+        line = list(program.line())
+        runs = [(each.run, each.arm) for each in line if each.run]
+        first = next((at for at, each in enumerate(line) if each.run), len(line))
+        waiting = {each.task for each in line[first + 1 :]}
+        names = {party: arm for arm, party in self.arms.items()}
+
+        def parked(party: Party) -> bool:
+            arm = names.get(party)
+            if arm is None or not runs or any(arm in run.alive and arm != own for run, own in runs):
+                return False
+
+            driver = self.drivers.get(arm)
+            return driver is None or driver.done() or driver in waiting
+
+        return parked
+
+    def leave(self, program: Program, name: str) -> None:
+        """Takes note that a program of a run has ended: what nobody moves any more is not waited for."""
+        if program.run:
+            program.run.alive.discard(name)
+
+        self._ended(program.task)
 
     def driven(self, program: Program) -> frozenset[Party]:
         """Returns the arms that a program has moved last."""
@@ -123,15 +176,18 @@ class Zones:
         return frozenset(each.party for each in line) | {self.arms[arm] for arm in named}
 
     @asynccontextmanager
-    async def hold(self, zone: str, arms: Collection[str], timeout: float | None) -> AsyncIterator[None]:
-        """Holds a zone for the length of a block."""
+    async def hold(self, zone: str, arms: Collection[str], timeout: float | None, epoch: Epoch) -> AsyncIterator[None]:
+        """Holds a zone for the length of a block that begins in an epoch of the fleet."""
         if zone not in self.shapes:
             raise ValueError(f"no zone {zone!r}; there are: {', '.join(self.shapes) or 'none'}")
 
         program = here()
+        program.check()
         own = self.own(program, *arms) | self.driven(program)
-        claim = await self.claim(Claim(program.party, own, frozenset([zone])), timeout)
+        parked = self.parked(program)
+        claim = await self.claim(Claim(program.party, own, frozenset([zone]), parked=parked), timeout)
         try:
+            epoch.check()
             with running(program):
                 yield
         finally:
@@ -174,8 +230,10 @@ class Zones:
 
         return claim
 
-    def drop(self, party: Party) -> None:
-        """Releases what the programs of an arm hold; what the arm itself is in, it keeps."""
-        for claim in self.claims.held:
-            if party in claim.own and claim.party is not party:
-                self.claims.release(claim)
+    def _ended(self, task: asyncio.Task[object] | None) -> None:
+        """A task moves nothing any more."""
+        for arm, driver in self.drivers.items():
+            if driver is task:
+                self.drivers[arm] = None
+
+        self.claims.settle()

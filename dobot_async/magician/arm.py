@@ -176,7 +176,8 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
             raise ValueError(f"{command.name} goes through the queue: await arm.queue.put(...)")
 
         check_ranges(value)
-        return await self.link.request(command, value, timeout=timeout)
+        request = self.link.request(command, value, timeout=timeout)
+        return await (self.queue.beside(request) if command.moves else request)
 
     async def get_pose(self, *, timeout: float | None = None) -> c.Pose:
         """Returns where the tool is (mm, degrees) and the joints (degrees). Manual 2.4.1."""

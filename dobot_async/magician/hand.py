@@ -60,7 +60,7 @@ class Led:
             ArmAlarm: The jog has ended at a limit; raised when the block ends.
             CommandRejected: The arm executes what is queued, and would not hear the jog.
         """
-        direction = Jog.of(direction)
+        direction, epoch = Jog.of(direction), self.queue.epoch
         command = c.JOGCmd(*direction.value)
         await self.queue.declared.check([command])
         if self.queue.pending:
@@ -72,7 +72,7 @@ class Led:
 
         before = await self._faults()
         async with self.link.cleanup.at_end(self._stop_jog, "the end of the jog"):
-            await self.link.request(c.SET_JOG_CMD, command)
+            await self.queue.beside(self.link.request(c.SET_JOG_CMD, command), epoch)
             yield
 
         check_limits(direction, before, await self._faults())

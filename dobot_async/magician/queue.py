@@ -8,11 +8,12 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any, Literal, TypeVar
 
 from dobot_async._core.queue.batch import BatchBuilder, batch
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import WITHDRAWN, Motion, Outbox
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_choice
 from dobot_async._core.util.tasks import STAYING
-from dobot_async.errors import DobotError, MotionStopped, MotionUnknown
+from dobot_async.errors import DobotError, MotionUnknown
 from dobot_async.magician import commands as c
 from dobot_async.magician.declared import Declarations, told_rail
 from dobot_async.magician.executor import MagicianExecutor
@@ -51,22 +52,25 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
 
     async def perform_from_goal(self, plan: Plan, needs: Need, timeout: float | None) -> Motion:
         """Queue what a plan makes of the goal of what is queued before it, or of where the arm stands."""
-        return await self.put(*await self.planned(plan, needs), timeout=timeout)
+        epoch = self.epoch
+        return await self.put(*await self.planned(plan, needs), timeout=timeout, epoch=epoch)
 
     async def planned(self, plan: Plan, needs: Need) -> tuple[Command[Any, None], Any]:
         """Return what a plan makes of the goal; raise MotionStopped if the arm was stopped while that was found out."""
-        stops = self._stopper.count
+        epoch = self.epoch
         goal = await self.find_goal(needs)
-        self._check_stops(stops)
+        epoch.check()
         return plan(goal)
 
-    async def put_all(self, motions: Sequence[Motion], *, timeout: float | None = None) -> None:
+    async def put_all(
+        self, motions: Sequence[Motion], *, timeout: float | None = None, epoch: Epoch | None = None
+    ) -> None:
         """Give several commands to the arm's queue with nothing between them; see `MotionQueue.put_all`.
 
         Raises:
             ValueError: One needs a rail, or a pin, that was not declared; none was sent.
         """
-        values, call, stops = [motion.entry.value for motion in motions], object(), self._stopper.count
+        values, call, epoch = [motion.entry.value for motion in motions], object(), epoch or self.epoch
         for motion in motions:
             motion.call = call
 
@@ -74,14 +78,14 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
             async with self._order:  # nothing overtakes what has to ask first
                 await self.declared.check(values, queued=True)
 
-            self._check_stops(stops)
+            epoch.check()
         except BaseException:
             for motion in motions:
                 motion.end(WITHDRAWN)
 
             raise
 
-        await super().put_all(motions, timeout=timeout)
+        await super().put_all(motions, timeout=timeout, epoch=epoch)
         for value in values:
             self.declared.told(value, queued=True)
 
@@ -176,18 +180,13 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
             ValueError: A rail or a pin that a command needs was declared neither to the arm nor in the program.
             MotionStopped: The arm was stopped meanwhile; a part of the program may be stored.
         """
-        program = Program(self)
+        program, epoch = Program(self), self.epoch
         yield program
         await self.declared.check([motion.entry.value for motion in program.motions], queued=True)
         outbox = Outbox(lambda _: None)
         outbox.add(program.motions)
         async with self._arm.cleanup.at_end(self._arm.end_download, "the end of the download"):
-            await self.exclusively(self._arm.download(outbox, loops), "the download")
-
-    def _check_stops(self, count: int) -> None:
-        """Raise MotionStopped if there was a stop since so many."""
-        if self._stopper.count != count:
-            raise MotionStopped("it was not sent: the arm was stopped meanwhile")
+            await self.exclusively(self._arm.download(outbox, loops), "the download", epoch)
 
     def _before(self, more: Iterable[Motion] = ()) -> Iterable[Motion]:
         """What has not ended, in its order, and some more."""

@@ -271,8 +271,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         """
         jog = jog_command(self._model, direction, speed)
         self.link.frame(self._model.row(jog[0]), jog[1])
-        await self.queue.update()
-        async with jogging(self._channel, self._runner, direction, jog, lambda: self.queue.pending):
+        async with jogging(self._channel, self._runner, direction, jog, self.queue):
             yield
 
     async def jog_stop(self) -> None:

@@ -8,12 +8,13 @@ JOG ... [block] ... IS_MOVING, STOP, look, STOP, look        the question goes o
 from __future__ import annotations
 
 import re
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 from dobot_async._core.link.correlator import Outcome, Request
+from dobot_async._core.queue.queue import MotionQueue
 from dobot_async.errors import CommandRejected, MotionStopped, ReplyTimeout
 from dobot_async.mycobot import commands as c
 from dobot_async.mycobot.channel import Channel
@@ -115,20 +116,21 @@ class Jogged:
 
 @asynccontextmanager
 async def jogging(
-    channel: Channel, runner: CobotRunner, direction: str, jog: Jog, busy: Callable[[], int]
+    channel: Channel, runner: CobotRunner, direction: str, jog: Jog, queue: MotionQueue
 ) -> AsyncIterator[None]:
     """Jog while the block lasts; see `MyCobot.jogging`."""
-    command, value = jog
-    if busy():
+    (command, value), epoch = jog, queue.epoch
+    await queue.update()
+    if queue.pending:
         raise CommandRejected(
-            f"{direction}: {busy()} motions are under way; await arm.queue.join(), or arm.stop(), before a jog"
+            f"{direction}: {queue.pending} motions are under way; await arm.queue.join(), or arm.stop(), before a jog"
         )
 
     start = await channel.ask(c.GET_ANGLES, None)
     jogged = Jogged(channel, runner, direction, jog, start)
     asked: Request[Frame] | None = None
     async with channel.link.cleanup.at_end(runner.stop, "the end of the jog"):
-        await channel.tell(command, value)
+        await queue.beside(channel.tell(command, value), epoch)
         yield
         asked = await jogged.ask()
 

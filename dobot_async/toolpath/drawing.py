@@ -20,6 +20,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, SupportsFloat
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.arguments import check_duration
 from dobot_async._core.util.tasks import cancel_and_join
@@ -129,7 +130,7 @@ class Drawing:
         self._progress = progress
         self._running: asyncio.Task[Any] | None = None
         self._stopped = False
-        self._epoch: Any = None
+        self._epoch = Epoch()
         self._began = 0.0
         self._taken = (0.0, 0.0)  # seconds that what is done has taken, and was guessed to take
         self.next_stroke = 0
@@ -165,7 +166,7 @@ class Drawing:
             return
 
         self._running, self._stopped, self._taken = asyncio.current_task(), False, (0.0, 0.0)
-        self._epoch = getattr(self._arm.queue, "epoch", None)  # which a stop by anybody ends, where the queue has one
+        self._epoch = self._arm.queue.epoch  # which a stop by anybody ends
         try:
             here, program = await program_for(self._arm, self._tool, self._pace)
             moves = self._moves(here)
@@ -232,8 +233,7 @@ class Drawing:
         if self._stopped:
             raise MotionStopped("the drawing was stopped")
 
-        if self._epoch:
-            self._epoch.check()
+        self._epoch.check()
 
     async def _watch(self, pending: deque[tuple[Motion, int]]) -> None:
         """Ask now and then how far the arm is: no more often, for each question takes the line for a while."""

@@ -244,7 +244,7 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
         if self.queue.pending:
             raise CommandRejected("motions are pending: a jog can begin when they are done, or stopped")
 
-        async with self._jogger.jogging(command, value):
+        async with self._jogger.jogging(command, value, self.queue):
             yield
 
     async def jog_stop(self, *, timeout: float = STAYING) -> None:

@@ -245,12 +245,12 @@ class GCodeRun:
 
     async def __aiter__(self) -> AsyncIterator[GCodeLine]:
         motions: list[Motion] = []
-        done = count = 0
+        done, count, epoch = 0, 0, self._queue.epoch
         try:
             with self._queue.watching():
                 for step in [*self._todo, None]:
                     if step:
-                        motions.append(await self._queue.put(step.command, step.value))
+                        motions.append(await self._queue.put(step.command, step.value, epoch=epoch))
 
                     while done < len(motions) and (step is None or motions[done].done):
                         await motions[done]

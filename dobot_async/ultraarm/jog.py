@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager, suppress
 from enum import Enum
 
 from dobot_async._core.queue.executor import alarmed
+from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.tasks import Cleanup, cancel_and_join
 from dobot_async.errors import CommandRejected, DobotError
 from dobot_async.ultraarm import commands as c
@@ -74,9 +75,11 @@ class Jogger:
         self._ran_out = False
 
     @asynccontextmanager
-    async def jogging(self, command: Command[c.JogMove, Receipt], value: c.JogMove) -> AsyncIterator[None]:
-        """Jog until the block ends; see `UltraArm.jogging`."""
-        runner = self._runner
+    async def jogging(
+        self, command: Command[c.JogMove, Receipt], value: c.JogMove, queue: MotionQueue
+    ) -> AsyncIterator[None]:
+        """Jog until the block ends, or a stop of the queue comes; see `UltraArm.jogging`."""
+        runner, epoch = self._runner, queue.epoch
         runner.state.check(command)
         if runner.jogging:
             raise CommandRejected("another jog goes on: end it first")
@@ -89,7 +92,7 @@ class Jogger:
 
             async with self._cleanup.at_end(self._end, "the end of the jog"):
                 runner.status.begin()
-                await runner.ask(command, value)
+                await queue.beside(runner.ask(command, value), epoch)
                 await self._sets_out()
                 self._watch = asyncio.create_task(self._look_on(), name="dobot_async jog")
                 yield

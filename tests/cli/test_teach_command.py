@@ -376,15 +376,17 @@ async def test_an_end_of_the_way_is_told_and_can_be_left(tmp_path: Path) -> None
 
 async def test_the_key_on_the_forearm(sim: Simulation, tmp_path: Path) -> None:
     file = tmp_path / "part.json"
-    running = asyncio.create_task(run("--url", sim.url, "--json", "teach", str(file), "--hand", "--count", "2"))
+    command = [*MODULE, "--url", sim.url, "teach", str(file), "--hand", "--count", "2"]
+    process = await asyncio.create_subprocess_exec(*command, stdin=asyncio.subprocess.DEVNULL, stdout=PIPE, stderr=PIPE)
+    assert process.stdout
+    assert b"hold the key" in await process.stdout.readline()
     await until(lambda: bool(sim.arm.state.get(c.SET_HHT_TRIG_OUTPUT_ENABLED)))
-    for place in ((220, 30, 50), (200, -40, 20)):
+    for number, place in enumerate(((220, 30, 50), (200, -40, 20)), 1):
         sim.arm.guide_to(*place)
-        await until(lambda: not sim.arm._taught)
+        assert f"point {number}: ".encode() in await process.stdout.readline()
 
-    code, output, errors = await running
-    assert (code, errors) == (0, "")
-    assert json.loads(output) == {"file": str(file), "steps": 2, "samples": 0, "seconds": 0}
+    output, errors = await process.communicate()
+    assert (process.returncode, output.decode(), errors) == (0, f"{file}: 2 points\n", b"")
     assert [step.pose[:2] for step in load_recording(file).steps] == [
         pytest.approx((220, 30), abs=0.01),
         pytest.approx((200, -40), abs=0.01),

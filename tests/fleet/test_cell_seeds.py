@@ -1,11 +1,29 @@
-"""Some seeds of the cell's scenario; `make soak OF=cell` runs more."""
+"""Some seeds of each scenario of a cell; `make soak OF=cell`, `OF=guards` and `OF=stops` run more."""
 
 from __future__ import annotations
 
 import pytest
-from scenario_of_a_cell import run_seed
+import scenario_of_a_cell
+import scenario_of_guards
+import scenario_of_stops
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_seed(seed: int) -> None:
-    run_seed(seed)
+    scenario_of_a_cell.run_seed(seed)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_seed_of_guarded_arms(seed: int) -> None:
+    scenario_of_guards.run_seed(seed)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_seed_of_a_stop(seed: int) -> None:
+    scenario_of_stops.run_seed(seed)
+
+
+def test_the_monitor_sees_what_happens_without_the_guard() -> None:
+    with pytest.raises(scenario_of_guards.Violation, match="are in zone"):
+        for seed in range(20):
+            scenario_of_guards.run_seed(seed, guard="off")

@@ -13,6 +13,7 @@ from virtual import virtual
 from dobot_async import ArmAlarm, ConnectFailed, ConnectionLost, Fleet, Magician, MotionStopped, MyCobot, UltraArm
 from dobot_async.fleet import BarrierBroken, Member
 from dobot_async.fleet.fleet import OnFailure
+from dobot_async.fleet.queue import FleetArm
 from dobot_async.fleet.seat import Seat
 from dobot_async.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate
@@ -158,7 +159,7 @@ async def test_each_does_the_same_at_the_same_time() -> None:
 
 @virtual
 async def test_stop_goes_to_all_at_once() -> None:
-    names = [f"arm{number}" for number in range(100)]
+    names = [f"arm{number}" for number in range(40)]
     async with cell(*names, speed=1, faults=Faults(latency=0.01)) as sims, Fleet.connect(urls(sims)) as fleet:
         motions = [await fleet[name].queue.wait(600) for name in names]
         await fleet.stop()
@@ -292,7 +293,7 @@ async def test_a_lost_link_is_noticed_although_nobody_asks() -> None:
 async def test_a_link_that_is_lost_before_its_arm_has_its_seat_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     begin = Seat.begin
 
-    async def begin_too_late(seat: Seat, arm: Magician, options: Mapping[str, Any]) -> None:
+    async def begin_too_late(seat: Seat, arm: FleetArm, options: Mapping[str, Any]) -> None:
         if seat.name == "left":
             sims["left"].unplug()
             await anext(aiter(arm.link.state))

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 from contextlib import AsyncExitStack
-from itertools import pairwise
+from functools import partial
+from itertools import count, pairwise
 
 import pytest
+from steps import Steps
 from virtual import virtual
 
 from dobot_async import ConnectionLost, DobotError, Fleet, Magician, MotionStopped, MyCobot, UltraArm
@@ -131,6 +134,50 @@ def test_the_worst_moment(moment: float, what: str) -> None:
                 assert isinstance(task.exception(), (ConnectionLost, MotionStopped, DobotError, type(None)))
 
     scene()
+
+
+def cancel(tasks: list[asyncio.Task[None]], cancelled: list[bool]) -> None:
+    """Cancels what there is by now."""
+    cancelled.append(all(task.cancel() for task in tasks))
+
+
+@virtual
+async def test_a_cancellation_at_each_step() -> None:
+    broken: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: broken.append(context))
+    async with AsyncExitStack() as stack:
+        fleet, sims = await cell(stack, 0.002, 0.002)
+
+        started: list[int] = []
+
+        async def start() -> None:
+            async with fleet.together() as together:
+                for name in together:
+                    together[name].wait(600)
+
+            started.append(step)
+
+        for step in count(1):
+            tasks: list[asyncio.Task[None]] = []
+            cancelled: list[bool] = []
+            steps = Steps(step, partial(cancel, tasks, cancelled))
+            tasks.append(steps.begin(start()))
+            await asyncio.wait(tasks, timeout=30)
+            assert tasks[0].done()
+            if not cancelled:
+                break
+
+            if step not in started:
+                assert tasks[0].cancelled()
+                assert all(sim.arm.device.idle for sim in sims), step
+
+            await fleet.stop()
+
+        assert step > 20
+        await fleet.stop()
+
+    gc.collect()
+    assert not broken, "a task of the driver died"
 
 
 @virtual

@@ -510,7 +510,7 @@ async def test_a_failed_arm_in_a_zone_is_not_waited_for() -> None:
 
 
 @virtual
-async def test_a_program_whose_arm_fails_loses_its_zones() -> None:
+async def test_a_program_whose_arm_fails_keeps_its_zones_to_the_end_of_its_block() -> None:
     async with facing(alone=True) as (fleet, sims):
 
         async def left() -> None:
@@ -526,7 +526,7 @@ async def test_a_program_whose_arm_fails_loses_its_zones() -> None:
         started = asyncio.get_running_loop().time()
         done = await fleet.run({"left": left(), "right": right()})
         assert done["right"] is not None
-        assert done["right"] - started < 2
+        assert done["right"] - started > 100
 
 
 @virtual

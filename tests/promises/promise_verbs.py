@@ -36,7 +36,9 @@ INTERNAL = frozenset(
         "fail",
         "greet",  # what connect does with an arm
         "leave",
+        "begin_own_stop",
         "begin_stop",  # what the arms and the poller do with the queue
+        "beside",
         "cancel_writer",
         "give_up",
         "look",
@@ -53,6 +55,7 @@ INTERNAL = frozenset(
         "prepare",
         "put_all",
         "stopping",
+        "stops_heard",
         "update",
         "watching",
     }
@@ -159,6 +162,11 @@ async def gcode_lines(arm: Any) -> None:
         pass
 
 
+async def streamed(arm: Any, family: Family) -> None:
+    """A stream of two motions."""
+    await arm.queue.stream(arm.queue.move_joints(*joints) for joints in (family.far, family.near))
+
+
 async def run_on(arm: Any, _: Any) -> None:
     """Awaits a coroutine of the arm that others make."""
     await asyncio.gather(arm.queue.join(), arm.queue.join())
@@ -195,6 +203,7 @@ def shared(family: Family) -> list[Verb]:
         core("queue.join", lambda arm, _: arm.queue.join(), LONG, prepare=prepared),
         Verb("queue.join", lambda arm, _: arm.queue.join(timeout=60), LONG, prepare=prepared, what="with a timeout"),
         Verb("queue.join", run_on, LONG, prepare=prepared, what="twice at a time"),
+        core("queue.stream", lambda arm, _: streamed(arm, family), LONG),
         core("queue.stop", lambda arm, _: arm.queue.stop(), prepare=prepared),
         Verb("queue.clear", lambda arm, _: arm.queue.clear(), SHORT, prepare=prepared, at_once=hosted),
         Verb("queue.pause", lambda arm, _: arm.queue.pause(), SHORT, prepare=prepared),

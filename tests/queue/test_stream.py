@@ -332,7 +332,7 @@ async def test_the_other_families_have_it_too() -> None:
 
         assert notes(failed.value)[0].startswith("step 2")
 
-    async with simulate("ultraarm") as sim2, UltraArm.connect(sim2.url) as arm2:
+    async with simulate("ultraarm", homed=True) as sim2, UltraArm.connect(sim2.url) as arm2:
         await arm2.queue.stream(arm2.queue.move_to(200, y, 40) for y in (0, 20))
         assert sim2.arm.pose.y == pytest.approx(20, abs=0.1)
 

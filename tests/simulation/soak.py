@@ -1,6 +1,7 @@
 """Runs many seeds, on all cores: `make soak SEEDS=100000`, or one with its trace: `soak.py --seed N --verbose`.
 
-`--of cell` takes the scenario of a cell instead of that of one arm. A seed that fails is printed with the command that
+`--of cell` takes the scenario of a cell instead of that of one arm, `--of guards` and `--of stops` those of guarded
+arms whose tools are watched, and of cells that are stopped. A seed that fails is printed with the command that
 replays it. `--memory` works in one process for hours of simulated time, and prints how much memory it takes.
 """
 
@@ -27,8 +28,13 @@ from typing import Any, Protocol
 CHUNK = 20
 SHOWN = 10
 PLAIN_INTERVAL = 10.0  # seconds between two lines where there is no terminal
-SCENARIOS = {"arm": "scenario", "cell": "scenario_of_a_cell"}
-FOLDERS = [str(Path(__file__).parents[1] / name) for name in ("simulation", "fleet")]
+SCENARIOS = {
+    "arm": "scenario",
+    "cell": "scenario_of_a_cell",
+    "guards": "scenario_of_guards",
+    "stops": "scenario_of_stops",
+}
+FOLDERS = [str(Path(__file__).parents[1] / name) for name in ("simulation", "fleet", "")]
 Result = tuple[int, str, dict[str, float]]
 
 

@@ -965,7 +965,7 @@ async def test_the_speed_of_sim_is_the_arms() -> None:
     async with Magician.connect("sim:?speed=10") as arm:
         start = loop.time()
         await arm.wait(10.0)
-        assert loop.time() - start == pytest.approx(1.0, abs=0.02)
+        assert 1.0 <= loop.time() - start <= 1.3  # the driver counts on real seconds, and looks seldom meanwhile
 
 
 @virtual

@@ -150,7 +150,9 @@ class Exchange(Connection, Generic[F]):
                 ready()
                 self._stats.repeated += request is not None
                 held = self._stragglers.suspected(frame.key, self._loop.time()) and not self._correlator.reorder_window
+                misfit = request.misfit if request else None
                 request = await self.send(frame, accept, timeout=left, held=held)
+                request.misfit = misfit
                 if held:
                     await self._send_barrier(frame.key, deadline)
 

@@ -41,8 +41,8 @@ class BatchBuilder:
 
 @asynccontextmanager
 async def batch(queue: MotionQueue, builder: B, timeout: float | None) -> AsyncIterator[B]:
-    """Queue what the block collects, with nothing between it, when the block ends; an error sends none."""
-    timeout = check_timeout(timeout)
+    """Queue what the block collects, with nothing between it, when the block ends; an error or a stop sends none."""
+    timeout, epoch = check_timeout(timeout), queue.epoch
     try:
         yield builder
     except BaseException:
@@ -51,4 +51,4 @@ async def batch(queue: MotionQueue, builder: B, timeout: float | None) -> AsyncI
 
         raise
 
-    await queue.put_all(builder.motions, timeout=timeout)
+    await queue.put_all(builder.motions, timeout=timeout, epoch=epoch)

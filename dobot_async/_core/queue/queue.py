@@ -21,6 +21,7 @@ from collections.abc import Coroutine, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, TypeVar, overload
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.executor import Entry, Executor, alarmed, in_motions, unseen
 from dobot_async._core.queue.motion import WITHDRAWN, Motion, Outbox
 from dobot_async._core.queue.poller import StatusPoller
@@ -44,13 +45,19 @@ __all__ = ["MotionQueue"]
 
 Q = TypeVar("Q")
 S = TypeVar("S", bound=StreamStep)
+T = TypeVar("T")
 logger = logging.getLogger("dobot_async.queue")
 
 
 class MotionQueue:
-    """What is put here the arm executes in order, each exactly once."""
+    """What is put here the arm executes in order, each exactly once.
+
+    Attributes:
+        epoch: What a motion in several steps is bound to; a stop ends it, and the next one is here.
+    """
 
     def __init__(self, executor: Executor) -> None:
+        self.epoch = Epoch()
         self._executor = executor
         executor.on_unknown.add(self.give_up)
         self._outbox = Outbox(self._accepted)
@@ -65,13 +72,16 @@ class MotionQueue:
         """How many accepted commands are not known to have ended."""
         return len(self._pending)
 
-    async def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
+    async def put(
+        self, command: Command[Q, Any], value: Q, *, timeout: float | None = None, epoch: Epoch | None = None
+    ) -> Motion:
         """Give one command to the arm's queue and return once the arm has accepted it.
 
         Args:
             command: A row of the table that may be queued.
             value: Its parameters.
             timeout: Seconds to wait for room in the arm's queue; None waits as long as the arm answers.
+            epoch: The epoch in which the steps that led here began, if others came before.
 
         Raises:
             ValueError: The parameters do not fit, or the command cannot be queued.
@@ -82,18 +92,34 @@ class MotionQueue:
             ConnectionLost: The link is gone.
         """
         motion = Motion(self, self.prepare(command, value))
-        await self.put_all([motion], timeout=timeout)
+        await self.put_all([motion], timeout=timeout, epoch=epoch)
         return motion
 
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
         """Return a checked entry; raise ValueError or TypeError as `put` does."""
         return self._executor.prepare(command, value)
 
-    async def put_all(self, motions: Sequence[Motion], *, timeout: float | None = None) -> None:
-        """Give several commands to the arm's queue with nothing between them; see `put`."""
+    async def put_all(
+        self, motions: Sequence[Motion], *, timeout: float | None = None, epoch: Epoch | None = None
+    ) -> None:
+        """Give several commands to the arm's queue with nothing between them; see `put`.
+
+        Args:
+            motions: What is to be sent.
+            timeout: Seconds to wait for room.
+            epoch: The epoch in which the steps that led here began; a stop since then lets nothing be sent.
+        """
         timeout, call = check_timeout(timeout), object()
         for motion in motions:
             motion.call = call
+
+        try:
+            (epoch or self.epoch).check()
+        except DobotError as error:
+            for motion in motions:
+                motion.end(error)
+
+            raise
 
         self._outbox.add(motions)
         self.write_on()
@@ -184,8 +210,8 @@ class MotionQueue:
         await self._executor.pause()
 
     async def resume(self) -> None:
-        """Let a paused arm go on."""
-        await self._executor.resume()
+        """Let a paused arm go on; a stop ends this call, which raises MotionStopped."""
+        await self.beside(self._executor.resume())
 
     async def stop(self, *, timeout: float = STAYING) -> None:
         """Stop the arm now, ahead of everything; all pending Motions raise MotionStopped, and the queue is empty.
@@ -216,6 +242,12 @@ class MotionQueue:
         """
         return self._stopper.begin(error, halt=halt, doubtful=doubtful)
 
+    def begin_own_stop(self, error: DobotError, *, halt: bool = True) -> asyncio.Task[None]:
+        """Begin to stop the arm for who knows of it: `join` does not tell of this stop again; see `begin_stop`."""
+        stop = self.begin_stop(error, halt=halt)
+        self._failure = None
+        return stop
+
     def stopping(self) -> AbstractContextManager[None]:
         """While this is entered nothing is sent, and nothing that the arm ticks off counts as done."""
         return self._stopper.holding()
@@ -227,6 +259,7 @@ class MotionQueue:
             error: What they raise.
             spare: Those that are left pending.
         """
+        self.epoch = self.epoch.end(error)
         self._poller.stir()
         ending = [motion for motion in self._pending if motion not in spare]
         self._pending = deque(spare)
@@ -261,9 +294,33 @@ class MotionQueue:
         """While this is entered, the arm is asked how far it is."""
         return self._poller.watching()
 
-    async def exclusively(self, work: Coroutine[Any, Any, None], what: str) -> None:
-        """Run work while nothing is sent; a stop ends it, and raises MotionStopped."""
-        await self._writer.exclusively(work, what)
+    async def exclusively(self, work: Coroutine[Any, Any, None], what: str, epoch: Epoch | None = None) -> None:
+        """Run work while nothing is sent; a stop ends it, and raises MotionStopped.
+
+        Args:
+            work: What is to be done.
+            what: Its name.
+            epoch: The epoch in which the steps that led here began.
+        """
+        await self._writer.exclusively(work, what, epoch or self.epoch)
+
+    async def beside(self, work: Coroutine[Any, Any, T], epoch: Epoch | None = None) -> T:
+        """Run work that sets the arm in motion without a Motion of its own, such as the begin of a jog.
+
+        A stop ends it before the arm is told to stop, so that nothing is repeated behind the stop.
+
+        Args:
+            work: What is to be done.
+            epoch: The epoch in which the steps that led here began.
+
+        Raises:
+            MotionStopped: The arm was stopped meanwhile.
+        """
+        return await self._stopper.beside(work, epoch or self.epoch)
+
+    async def stops_heard(self) -> None:
+        """Return when no stop goes on any more; raise ReplyTimeout if the arm does not hear it."""
+        await self._stopper.over()
 
     @property
     def next(self) -> Motion | None:
@@ -343,9 +400,7 @@ class MotionQueue:
 
     async def _stop(self, error: DobotError, timeout: float, *, halt: bool) -> None:
         """Stop, and wait until the arm has heard it."""
-        stop = self.begin_stop(error, halt=halt)
-        self._failure = None  # whoever stops an arm knows that it was stopped
-        await self._stopper.wait(stop, timeout)
+        await self._stopper.wait(self.begin_own_stop(error, halt=halt), timeout)
 
     def _first_moving(self) -> Sequence[Motion]:
         """The first motion that is not known to be done, if there is one."""

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Coroutine, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.executor import Executor
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.arguments import check_timeout
-from dobot_async._core.util.tasks import STAYING
-from dobot_async.errors import ConnectionLost, DobotError, ReplyTimeout
+from dobot_async._core.util.tasks import STAYING, cancel_and_join
+from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
 
 __all__ = ["Stopper"]
+
+T = TypeVar("T")
 
 
 class Stopped(Protocol):
@@ -44,6 +47,7 @@ class Stopper:
         self._executor = executor
         self._queue = queue
         self._tasks: set[asyncio.Task[None]] = set()
+        self._beside: set[asyncio.Task[Any]] = set()
         self._under_way = 0
 
     @property
@@ -87,6 +91,30 @@ class Stopper:
 
         stop.result()
 
+    async def beside(self, work: Coroutine[Any, Any, T], epoch: Epoch) -> T:
+        """Run work that sets the arm in motion beside the queue; see `MotionQueue.beside`."""
+        try:
+            await self.over()
+            epoch.check()
+        except BaseException:
+            work.close()
+            raise
+
+        task = asyncio.create_task(work, name="dobot_async beside the queue")
+        self._beside.add(task)
+        task.add_done_callback(self._beside.discard)
+        try:
+            await asyncio.wait([task])
+        finally:
+            if not task.done():
+                await cancel_and_join(task)
+
+        if task.cancelled():
+            epoch.check()
+            raise MotionStopped("the arm was stopped")
+
+        return task.result()
+
     async def over(self) -> None:
         """Return when no stop goes on; raise ReplyTimeout if the arm does not hear it."""
         while self._tasks:
@@ -99,6 +127,9 @@ class Stopper:
         try:
             if doubtful:  # their fate is not awaited for longer than an arm may be silent
                 asyncio.get_running_loop().call_later(STAYING, end_all, doubtful, error)
+
+            for task in list(self._beside):  # nothing of it is sent behind the stop
+                await cancel_and_join(task)
 
             if halt:
                 await self._executor.stop()

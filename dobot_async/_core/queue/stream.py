@@ -17,6 +17,7 @@ from collections.abc import AsyncIterable, AsyncIterator, Coroutine, Generator, 
 from contextlib import AbstractContextManager, suppress
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.errors import ArmAlarm, DobotError
@@ -50,7 +51,11 @@ class StreamStep(Protocol):
 class Queue(Protocol):
     """The queue, as far as a stream is concerned."""
 
-    async def put(self, command: Command[Any, Any], value: Any) -> Motion:
+    @property
+    def epoch(self) -> Epoch:
+        """The time since the last stop."""
+
+    async def put(self, command: Command[Any, Any], value: Any, *, epoch: Epoch | None = None) -> Motion:
         """Give one command to the arm's queue and return once the arm has accepted it."""
 
     def watching(self) -> AbstractContextManager[None]:
@@ -129,6 +134,7 @@ class Feeder:
         self.news = asyncio.Event()
         self._queue = queue
         self._steps = steps
+        self._epoch = queue.epoch
         self._putting: tuple[str, Any] | None = None
 
     async def feed(self) -> None:
@@ -140,7 +146,7 @@ class Feeder:
                 is_verb = isinstance(step, Coroutine)
                 self._putting = (name_of(step, number), step)
                 await self._acquire(step)
-                motion = await (step if is_verb else self._queue.put(step.command, step.value))
+                motion = await (step if is_verb else self._queue.put(step.command, step.value, epoch=self._epoch))
                 if not isinstance(motion, Motion):
                     raise TypeError("a step is a verb of the queue, such as arm.queue.home(), or has command and value")
 
@@ -179,6 +185,7 @@ class Feeder:
         """Wait for room."""
         try:
             await self.room.acquire()
+            self._epoch.check()
         except BaseException:
             close([step])
             raise

@@ -7,6 +7,7 @@ import logging
 from collections.abc import Coroutine
 from typing import Any, Protocol
 
+from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.executor import Executor
 from dobot_async._core.queue.motion import Outbox
 from dobot_async._core.queue.poller import StatusPoller
@@ -64,14 +65,20 @@ class Writer:
         if self._task:
             await cancel_and_join(self._task)
 
-    async def exclusively(self, work: Coroutine[Any, Any, None], what: str) -> None:
+    async def exclusively(self, work: Coroutine[Any, Any, None], what: str, epoch: Epoch) -> None:
         """Run work in place of the writer: nothing is sent meanwhile, and a stop ends it.
 
         Raises:
             MotionStopped: The queue was stopped.
         """
-        while self._task and not self._task.done():
-            await asyncio.wait([self._task])
+        try:
+            while self._task and not self._task.done():
+                await asyncio.wait([self._task])
+
+            epoch.check()
+        except BaseException:
+            work.close()
+            raise
 
         self._task = task = asyncio.create_task(work, name=f"dobot_async {what}")
         try:

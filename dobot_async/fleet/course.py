@@ -1,0 +1,49 @@
+"""What an arm has to do, and where that leads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from dobot_async._core.queue.motion import Motion
+from dobot_async.fleet.planner import Stance
+
+__all__ = ["Course", "Step"]
+
+S = TypeVar("S", bound=Stance)
+
+
+@dataclass(eq=False, slots=True)
+class Step:
+    """One command on its way.
+
+    Attributes:
+        motion: The command.
+        zones: What it leads through.
+        after: The zones in which it ends; None if that is not known, or if it leaves the arm where it is.
+    """
+
+    motion: Motion
+    zones: frozenset[str] = frozenset()
+    after: frozenset[str] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Course(Generic[S]):
+    """Several commands that are sent together, looked at before they are.
+
+    Attributes:
+        steps: Each of them.
+        end: Where the arm stands after them, if that is known.
+        moves: Whether one of them moves the arm, or changes its ways.
+    """
+
+    steps: Sequence[Step]
+    end: S | None
+    moves: bool
+
+    @property
+    def zones(self) -> frozenset[str]:
+        """What they lead through."""
+        return frozenset().union(*(step.zones for step in self.steps))

@@ -1,0 +1,299 @@
+"""The ways of a Magician, with its end effector and on its rail, as far as they are known; see `paths`.
+
+What the arm keeps beside its joints is read together with them: after a restart it has forgotten its end effector. The
+tool that the program has last said to be on the arm is remembered here: if the arm believes something else, its tool
+may be elsewhere by the difference (`slack`).
+
+On a rail the arm and the rail go at once, and nothing tells how fast: a way is all that the arm can touch on it, from
+wherever the rail comes along.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
+
+from dobot_async.fleet.paths import STEP, Lift, Way, reach_of, way_of
+from dobot_async.fleet.planner import XYZ, Discs, Plan, Points, Region
+from dobot_async.magician import commands as c
+from dobot_async.magician.kinematics import Joints, Kinematics
+from dobot_async.magician.reach import destination
+from dobot_async.wire import Command
+
+__all__ = ["MagicianPlanner", "MagicianStance"]
+
+Q = TypeVar("Q")
+R = TypeVar("R")
+RAIL_LENGTH = 1000.0  # mm
+SAME = 0.3  # mm and degrees that an arm may stand off from where it was to stand
+SAME_TOOL = 0.01  # mm
+Span = tuple[float, float]
+
+
+class Asked(Protocol):
+    """A Magician, as far as it is asked."""
+
+    async def request(self, command: Command[Q, R], value: Q) -> R:
+        """Send any row of the command table immediately, and return the arm's answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class MagicianStance:
+    """Where a Magician stands.
+
+    Attributes:
+        joints: Its joints.
+        bias: Its end effector, as the arm believes.
+        slack: mm by which its tool may be elsewhere.
+        heading: The direction in which l grows, degrees to the left of x; None for an arm on no rail.
+        rail: Least and greatest place on the rail, mm.
+        rides: Whether the arm was told of its rail.
+        lifts: Those of jumps that are on their way to the arm.
+    """
+
+    joints: Joints
+    bias: c.EndEffectorParams
+    slack: float = 0.0
+    heading: float | None = None
+    rail: Span = (0.0, 0.0)
+    rides: bool = False
+    lifts: frozenset[Lift] = frozenset()
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """The geometry with its end effector."""
+        return kinematics_of(self.bias)
+
+    @property
+    def tool(self) -> XYZ:
+        """The place of the tool, in the middle of where the rail may be."""
+        (place,) = shifted([self.kinematics.forward(*self.joints)[:3]], self.heading, [sum(self.rail) / 2])
+        return place
+
+    @property
+    def region(self) -> Region:
+        """Where the tool is."""
+        return self.along([self.kinematics.forward(*self.joints)[:3]], self.rail)
+
+    def along(self, places: Sequence[XYZ], rail: Span) -> Region:
+        """Where the tool comes along while the rail goes from one of its places to another."""
+        if rail[0] == rail[1]:
+            return Points(shifted(places, self.heading, [rail[0]]), self.slack)
+
+        radius = max(math.hypot(x, y) for x, y, _ in places)
+        return Discs(centres(self.heading, rail), radius + self.slack + STEP)
+
+    def near(self, other: MagicianStance) -> bool:
+        """Return whether another one is the same, but for what numbers lose on the line."""
+        return (
+            math.dist(self.joints, other.joints) < SAME
+            and math.dist(numbers(self.bias), numbers(other.bias)) < SAME
+            and math.dist(self.rail, other.rail) < SAME
+        )
+
+
+class MagicianPlanner:
+    """The planner of one Magician; see `Planner`.
+
+    Args:
+        arm: The arm.
+        heading: The direction in which l grows; None for an arm on no rail.
+    """
+
+    def __init__(self, arm: Asked, heading: float | None) -> None:
+        self._arm = arm
+        self._heading = heading
+        self._said: list[c.EndEffectorParams] = []  # one of these is on the arm
+        self._bias = c.EndEffectorParams(0.0)
+        self._longest = 0.0  # mm from the wrist, of all end effectors so far
+
+    async def look(self) -> MagicianStance:
+        """Read where the arm stands."""
+        pose = await self._arm.request(c.GET_POSE, None)
+        self._bias = bias = await self._arm.request(c.GET_END_EFFECTOR_PARAMS, None)
+        self._longest = max(self._longest, math.hypot(*numbers(bias)))
+        rail, rides = await self._read_rail(), False
+        if self._heading is not None:
+            rides = await self._arm.request(c.GET_DEVICE_WITH_L, None)
+
+        joints = Joints(pose.j1, pose.j2, pose.j3, pose.j4)
+        return MagicianStance(joints, bias, self._slack(bias), self._heading, rail, rides)
+
+    async def tool(self) -> XYZ:
+        """Read where its tool is."""
+        pose = await self._arm.request(c.GET_POSE, None)
+        (place,) = shifted([(pose.x, pose.y, pose.z)], self._heading, [sum(await self._read_rail()) / 2])
+        return place
+
+    async def plan(self, value: object, start: MagicianStance | None) -> Plan[MagicianStance]:
+        """Return where a motion leads."""
+        if isinstance(value, c.JOGCmd):
+            raise ValueError("a jog without an end cannot be guarded; use arm.jogging(...)")  # noqa: TRY004
+
+        if isinstance(value, (c.PTPWithLCmd, c.PTPPOWithLCmd)):
+            return await self._ride(value, start)
+
+        way = await self._way(value, start)
+        if start is None or way is None:
+            return Plan(self.reach(start), None, self._goal(value, start.rail if start else None))
+
+        region = start.along(way.places, start.rail)
+        return Plan(region, replace(start, joints=way.end), shifted(way.places, self._heading, start.rail))
+
+    def change(self, value: object, start: MagicianStance | None) -> Plan[MagicianStance] | None:
+        """Return what a command does that moves nothing."""
+        if isinstance(value, (c.PTPJumpParams, c.PTPJump2Params)):
+            end = start and replace(start, lifts=start.lifts | {lift_of(value)})
+            return Plan(start.region if start else self.reach(start), end, ())
+
+        if isinstance(value, c.DeviceWithL):
+            end = start and replace(start, rides=value.is_with_l)
+            return Plan(start.region if start else self.reach(start), end, ())
+
+        if isinstance(value, c.JOGCmd) and value.cmd is not c.JOGKey.IDLE:
+            raise ValueError("a jog without an end cannot be guarded; use arm.jogging(...)")
+
+        return self._change_tool(value, start) if isinstance(value, c.EndEffectorParams) else None
+
+    def begun(self, value: object) -> None:
+        """Take note that a command is on its way: an end effector that the program says is on the arm from now on."""
+        if isinstance(value, c.EndEffectorParams):
+            self._said.append(value)
+
+    def settled(self, stance: MagicianStance) -> None:
+        """Take note of the end effector that the arm was told of last, unless it has forgotten it."""
+        if not self._said or self._is_said(stance.bias):
+            self._said = [stance.bias]
+
+    def reach(self, stance: MagicianStance | None) -> Region:
+        """Return where the arm may come on ways that are not known: all around, and all along its rail."""
+        bias = stance.bias if stance else c.EndEffectorParams(0.0)
+        longest = max(self._longest, math.hypot(*numbers(bias)))
+        around = reach_of(Kinematics(longest, longest, 0.0)) + (stance.slack if stance else 0.0) + STEP
+        return Discs(centres(self._heading, (0.0, RAIL_LENGTH)) if self._heading is not None else ((0.0, 0.0),), around)
+
+    async def _way(self, value: object, start: MagicianStance | None) -> Way | None:
+        """The way of the arm itself, if it is known."""
+        if start is None:
+            return None
+
+        return way_of(value, start.joints, start.kinematics, await self._lifts_for(value, start))
+
+    async def _ride(self, value: c.PTPWithLCmd | c.PTPPOWithLCmd, start: MagicianStance | None) -> Plan[MagicianStance]:
+        """Where a motion leads that takes the rail along."""
+        if self._heading is None:
+            raise ValueError("l: this guarded arm is on no rail; say where its rail leads, Member(..., rail=90)")
+
+        if not 0 <= value.rail <= RAIL_LENGTH:
+            raise ValueError(f"l must be in 0 to {RAIL_LENGTH:g} mm, not {value.rail:g}")
+
+        arm = c.PTPCmd(value.ptp_mode, value.x, value.y, value.z, value.r)
+        way = await self._way(arm, start)
+        if start is None or way is None:
+            return Plan(self.reach(start), None, self._goal(arm, (value.rail, value.rail)))
+
+        # An arm that was not told of its rail leaves it alone.
+        swept = (min(start.rail[0], value.rail), max(start.rail[1], value.rail)) if start.rides else start.rail
+        there = (value.rail, value.rail) if start.rides else start.rail
+        # A box that contains both ends of the rail's way contains what lies between.
+        outline = shifted(way.places, self._heading, (*start.rail, *there))
+        return Plan(start.along(way.places, swept), replace(start, joints=way.end, rail=there), outline)
+
+    def _change_tool(self, bias: c.EndEffectorParams, start: MagicianStance | None) -> Plan[MagicianStance]:
+        """Another end effector: the tool is elsewhere, though nothing has moved."""
+        self._longest = max(self._longest, math.hypot(*numbers(bias)))
+        if start is None:
+            return Plan(self.reach(start), None, ())
+
+        end = replace(start, bias=bias, slack=0.0)
+        places = [stance.kinematics.forward(*start.joints)[:3] for stance in (start, end)]
+        return Plan(start.along(places, start.rail), end, ())
+
+    def _goal(self, value: object, rail: Span | None) -> Sequence[XYZ] | None:
+        """Where a way that is not known ends, if that is given; none for what limits do not concern."""
+        if isinstance(value, FREE):
+            return ()
+
+        target = destination(value)
+        if isinstance(value, (c.CPCmd, c.CPLECmd)) and value.cp_mode is c.CPMode.ABSOLUTE:
+            place: XYZ = value.x, value.y, value.z
+        elif target is None:
+            return None
+        elif target.joints:
+            place = kinematics_of(self._said[-1] if self._said else self._bias).forward(*target.numbers)[:3]
+        else:
+            place = target.numbers[:3]
+
+        if self._heading is None:
+            rail = 0.0, 0.0
+
+        return shifted([place], self._heading, rail) if rail else None
+
+    async def _lifts_for(self, value: object, start: MagicianStance) -> list[Lift]:
+        """The lifts that a jump may have: those that the arm keeps, and those on their way to it."""
+        if not isinstance(value, (c.PTPCmd, c.PTPPOCmd)) or value.ptp_mode not in JUMPS:
+            return []
+
+        same = await self._arm.request(c.GET_PTP_JUMP_PARAMS, None)
+        apart = await self._arm.request(c.GET_PTP_JUMP2_PARAMS, None)
+        return [lift_of(same), lift_of(apart), *start.lifts]
+
+    async def _read_rail(self) -> Span:
+        """Where the arm stands on its rail: anywhere, for one that does not tell."""
+        if self._heading is None:
+            return 0.0, 0.0
+
+        place = await self._arm.request(c.GET_POSE_L, None)
+        return (place, place) if math.isfinite(place) else (0.0, RAIL_LENGTH)
+
+    def _slack(self, bias: c.EndEffectorParams) -> float:
+        """How far the tool may be from where the arm believes it is: it has forgotten what was said last."""
+        if not self._said or self._is_said(bias):
+            return 0.0
+
+        return max(math.dist(numbers(each), numbers(bias)) for each in self._said)
+
+    def _is_said(self, bias: c.EndEffectorParams) -> bool:
+        """Whether an end effector is one that the program has said."""
+        return any(math.dist(numbers(each), numbers(bias)) < SAME_TOOL for each in self._said)
+
+
+JUMPS = (c.PTPMode.JUMP_XYZ, c.PTPMode.JUMP_ANGLE, c.PTPMode.JUMP_MOVL_XYZ)
+FREE = (c.HOMECmd, c.AutoLevelingCmd, type(None))
+"""What limits do not concern: where these lead is the arm's own affair."""
+
+
+def numbers(bias: c.EndEffectorParams) -> XYZ:
+    """The offset of an end effector."""
+    return bias.x_bias, bias.y_bias, bias.z_bias
+
+
+def kinematics_of(bias: c.EndEffectorParams) -> Kinematics:
+    """The geometry with an end effector."""
+    return Kinematics(*numbers(bias))
+
+
+def lift_of(value: c.PTPJumpParams | c.PTPJump2Params) -> Lift:
+    """What the parameters of jumps say."""
+    if isinstance(value, c.PTPJumpParams):
+        return Lift(value.jump_height, value.jump_height, value.z_limit)
+
+    return Lift(value.start_jump_height, value.end_jump_height, value.z_limit)
+
+
+def shifted(places: Sequence[XYZ], heading: float | None, rail: Sequence[float]) -> tuple[XYZ, ...]:
+    """Places of the arm, from each of these places on its rail."""
+    if heading is None:
+        return tuple(places)
+
+    cos, sin = math.cos(math.radians(heading)), math.sin(math.radians(heading))
+    return tuple((x + at * cos, y + at * sin, z) for at in dict.fromkeys(rail) for x, y, z in places)
+
+
+def centres(heading: float | None, rail: Span) -> tuple[tuple[float, float], ...]:
+    """Where the arm itself stands on a part of its rail, at most a STEP apart."""
+    steps = max(1, math.ceil((rail[1] - rail[0]) / STEP))
+    along = [rail[0] + (rail[1] - rail[0]) * step / steps for step in range(steps + 1)]
+    return tuple((x, y) for x, y, _ in shifted([(0.0, 0.0, 0.0)], heading, along))
