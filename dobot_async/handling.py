@@ -22,25 +22,19 @@ from dobot_async._core.util.arguments import check_choice, check_duration, to_fl
 from dobot_async.arms.base import Arm
 from dobot_async.errors import DobotError, UnsupportedError
 from dobot_async.grid import GridPlace
-from dobot_async.hands import AIR, hand_of, move_straight, target_of, to_arguments
-from dobot_async.mycobot.arm import MyCobot
+from dobot_async.hands import AIR, Check, gripper_holds, hand_of, move_straight, stop_check, target_of, to_arguments
 
-__all__ = ["PartMissing", "PartStuck", "Tool", "gripper_holds", "pick", "pick_and_place", "place"]
+__all__ = ["HandlingError", "PartMissing", "PartStuck", "Tool", "gripper_holds", "pick", "pick_and_place", "place"]
 
-Switch = Callable[[bool], Awaitable[None]]
+Switch = Callable[[bool], Awaitable[object]]
 Tool = Literal["suction", "gripper"] | Switch
 """The arm's suction cup, its gripper, or a function of your own: called with True to take, with False to let go."""
 
-Check = Callable[[], bool | Awaitable[bool]]
-"""Tells whether there is a part in the tool."""
-
 APPROACH = 40.0
-CLOSED = 3
-"""Percent of its opening up to which a gripper counts as closed on nothing."""
 
 
-class PartMissing(DobotError):
-    """There is no part in the tool where there should be one; the arm is above the place, and its tool is off.
+class HandlingError(DobotError):
+    """A part is not where it should be. The arm is above the place, and its tool has let go.
 
     Attributes:
         place: Where it should have been picked, or where it was to be placed.
@@ -51,31 +45,12 @@ class PartMissing(DobotError):
         self.place = where
 
 
-class PartStuck(DobotError):
-    """The part is still in the tool, which has let go; the arm is above the place.
-
-    Attributes:
-        place: Where it was to be placed.
-    """
-
-    def __init__(self, message: str, where: object) -> None:
-        super().__init__(message)
-        self.place = where
+class PartMissing(HandlingError):
+    """There is no part in the tool where there should be one."""
 
 
-def gripper_holds(arm: MyCobot, *, least: float = CLOSED) -> Check:
-    """Return a check for `pick`: a gripper that tells its opening holds a part if that has kept it open.
-
-    Args:
-        arm: One whose gripper tells how far it is open.
-        least: Percent up to which it counts as closed on nothing.
-    """
-    least = to_float(least, "least")
-
-    async def holds() -> bool:
-        return await arm.get_gripper() > least
-
-    return holds
+class PartStuck(HandlingError):
+    """The part is still in the tool."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +63,7 @@ class Handling:
         above: Where it begins and ends.
         tool: With what.
         seconds: That the tool needs.
+        check_stop: Raises if the arm was stopped since this was planned.
     """
 
     arm: Any
@@ -95,10 +71,12 @@ class Handling:
     above: Any
     tool: Tool
     seconds: float
+    check_stop: Callable[[], None]
 
     async def switch(self, *, take: bool) -> None:
         """Let the tool take, or let go, and return when it has."""
         release = hand_of(self.arm).release
+        self.check_stop()
         if callable(self.tool):
             await self.tool(take)
         elif not take and self.tool in release:
@@ -107,16 +85,20 @@ class Handling:
             await getattr(self.arm, self.tool)(take)
 
         if self.seconds:
+            self.check_stop()
             await self.arm.wait(self.seconds)
 
     async def approach(self) -> None:
         """Go above the place."""
+        self.check_stop()
         await self.arm.move_to(*to_arguments(self.above))
 
     async def touch(self, *, take: bool) -> None:
         """Go down, let the tool take or let go, and come up."""
+        self.check_stop()
         await move_straight(self.arm, self.target)
         await self.switch(take=take)
+        self.check_stop()
         await move_straight(self.arm, self.above)
 
 
@@ -154,7 +136,8 @@ def planned(
         hand.check(arm, each)
 
     usual = AIR if callable(tool) else hand.settle[tool]
-    return Handling(arm, target, above, tool, usual if seconds is None else check_duration(seconds, "settle"))
+    needed = usual if seconds is None else check_duration(seconds, "settle")
+    return Handling(arm, target, above, tool, needed, stop_check(arm))
 
 
 async def holds_part(check: Check | None, default: bool) -> bool:

@@ -6,6 +6,8 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from dobot_async._core.queue.epoch import Epoch
+from dobot_async._core.util.arguments import to_float
 from dobot_async.arms.base import Arm
 from dobot_async.grid import GridPlace
 from dobot_async.grid import place as to_place
@@ -17,7 +19,24 @@ from dobot_async.mycobot.pose import CobotPose
 from dobot_async.ultraarm import commands as u
 from dobot_async.ultraarm.arm import UltraArm
 
-__all__ = ["AIR", "Hand", "hand_of", "move_straight", "settle_time", "target_of", "to_arguments"]
+__all__ = [
+    "AIR",
+    "Check",
+    "Hand",
+    "gripper_holds",
+    "hand_of",
+    "move_straight",
+    "settle_time",
+    "stop_check",
+    "target_of",
+    "to_arguments",
+]
+
+Check = Callable[[], bool | Awaitable[bool]]
+"""Tells whether there is a part in the tool."""
+
+CLOSED = 3.0
+"""Percent of its opening up to which a gripper counts as closed on nothing."""
 
 POSES = (Pose, CobotPose, u.UltraArmPose)
 
@@ -121,3 +140,27 @@ async def move_straight(arm: Arm, where: Any) -> None:
         DobotError: As the arm's `move_to`.
     """
     await hand_of(arm).straight(arm, target_of(where))
+
+
+def gripper_holds(arm: MyCobot, *, least: float = CLOSED) -> Check:
+    """Return a check for `pick`: a gripper that tells its opening holds a part if that has kept it open.
+
+    Args:
+        arm: One whose gripper tells how far it is open.
+        least: Percent up to which it counts as closed on nothing.
+    """
+    least = to_float(least, "least")
+
+    async def holds() -> bool:
+        return await arm.get_gripper() > least
+
+    return holds
+
+
+def stop_check(arm: Arm) -> Callable[[], None]:
+    """Return what raises MotionStopped once the arm was stopped: what takes several steps does not go on past a stop.
+
+    It is called right before each step, with nothing awaited in between.
+    """
+    epoch = getattr(arm.queue, "epoch", None)
+    return epoch.check if isinstance(epoch, Epoch) else lambda: None

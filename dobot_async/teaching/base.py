@@ -12,7 +12,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any
 
 from dobot_async.errors import CommandRejected, UnsupportedError
-from dobot_async.hands import settle_time
+from dobot_async.hands import settle_time, stop_check
 from dobot_async.teaching.recording import Mode, PathSample, Recording, TaughtStep
 
 __all__ = ["Limits", "TaughtArm", "clip"]
@@ -117,6 +117,7 @@ class TaughtArm(ABC):
         limits: What it can be told.
         mode: How a step is reached unless somebody says it.
         turn: The word of the axis that turns the tool, for jogs; "" where there is none.
+        check_stop: Raises if the arm was stopped since this was made: nothing is played past a stop.
     """
 
     limits: Limits
@@ -125,6 +126,7 @@ class TaughtArm(ABC):
 
     def __init__(self, arm: Any) -> None:
         self.arm = arm
+        self.check_stop = stop_check(arm)
 
     @property
     def model(self) -> str:
@@ -175,6 +177,7 @@ class TaughtArm(ABC):
         for tool in ("suction", "gripper"):
             wanted = getattr(step, tool)
             if wanted is not None and wanted != state.get(tool):
+                self.check_stop()
                 await self.tell_tool(tool, wanted)
                 state[tool] = wanted
 

@@ -125,6 +125,7 @@ class TaughtMagician(TaughtArm):
         ways = zip(start.joints, end.joints, self._fastest, strict=True)
         needed = max(abs(b - a) / fastest for a, b, fastest in ways)
         await self.arm.set_speed(clip(100 * needed / seconds, 1, 100), 100)
+        self.check_stop()
         j1, j2, j3, j4 = end.joints
         await self.arm.move_joints(j1, j2, j3, j4)
 

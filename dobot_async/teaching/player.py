@@ -49,6 +49,7 @@ async def play(
         progress: Called with (steps done, steps in all) after each step of a loop.
 
     Raises:
+        MotionStopped: The arm was stopped meanwhile, whatever it did then: nothing goes on past a stop.
         RecordingUnfit: The arm cannot do it: another family, model or tool, or beyond limits or reach. Nothing moved.
         ValueError: An argument is out of range.
         DobotError: As the verbs of the arm.
@@ -78,9 +79,11 @@ async def play_steps(
 ) -> None:
     """Do one step after the other; `state` is what the tools were told last."""
     for number, step in enumerate(recording.steps, 1):
+        player.check_stop()
         await player.move(step, percent)
         await player.switch(step, state)
         if step.pause:
+            player.check_stop()
             await player.arm.wait(step.pause)
 
         report(number, len(recording.steps))
@@ -90,15 +93,18 @@ async def play_path(player: TaughtArm, recording: Recording, factor: float, repo
     """Go from sample to sample, none of them faster than it was shown: who is late rests less."""
     path, clock = recording.thinned().path, asyncio.get_running_loop().time
     here = replace(path[0], joints=(await player.look())[1], pose=())
+    player.check_stop()
     await player.pace(here, path[0], travel_time(here.joints, path[0].joints))
     report(1, len(path))
     began = clock()
     for number, (start, end) in enumerate(itertools.pairwise(path), 2):
         due = began + (end.time - path[0].time) / factor
         if any(abs(a - b) > STILL for a, b in zip(start.joints, end.joints, strict=True)):
+            player.check_stop()
             await player.pace(start, end, (end.time - start.time) / factor)
 
         await asyncio.sleep(max(0.0, due - clock()))
+        player.check_stop()
         report(number, len(path))
 
 

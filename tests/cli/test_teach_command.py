@@ -417,6 +417,29 @@ async def test_a_released_cobot_is_led_until_a_key_is_pressed(tmp_path: Path) ->
     assert path[-1].joints[0] == pytest.approx(20, abs=0.1)
 
 
+async def test_the_answer_in_json(tmp_path: Path) -> None:
+    file = tmp_path / "part.json"
+    async with simulate("mycobot280", listen="tcp://127.0.0.1:0") as sim:
+        options = ("--json", "--arm", "mycobot", "teach", str(file), "--hand", "--yes", "--seconds", "1")
+        running = asyncio.create_task(run("--url", sim.url, *options))
+        await until(lambda: bool(sim.arm.released))
+        for turned in range(100):
+            if sim.arm.released:
+                sim.arm.guide_to(turned, 0, 0, 0, 0, 0)
+                await asyncio.sleep(0.05)
+
+        code, output, errors = await running
+
+    path = load_recording(file).path
+    assert (code, errors) == (0, "")
+    assert json.loads(output) == {
+        "file": str(file),
+        "steps": 0,
+        "samples": len(path),
+        "seconds": path[-1].time - path[0].time,
+    }
+
+
 async def test_an_ultraarm_that_notices_nothing_leaves_no_file(tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     async with simulate("ultraarm", listen="tcp://127.0.0.1:0", homed=True) as sim:

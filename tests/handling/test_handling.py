@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from virtual import virtual
 
-from dobot_async import InfraredPort, Magician, MyCobot, PTPMode, UltraArm, UnsupportedError
+from dobot_async import InfraredPort, Magician, MotionStopped, MyCobot, PTPMode, UltraArm, UnsupportedError
 from dobot_async.grid import Grid
 from dobot_async.handling import PartMissing, PartStuck, gripper_holds, pick, pick_and_place, place
 from dobot_async.magician import commands as c
@@ -291,3 +291,26 @@ async def test_a_cancelled_pick_stops_the_arm_and_keeps_the_part() -> None:
 
         assert sim.arm.device.idle
         assert scene.pieces["red"].on == "tool of"
+
+
+@pytest.mark.parametrize("at", [1, 2, 3, 4])
+@virtual
+async def test_nothing_goes_on_past_a_stop(at: int) -> None:
+    """Whatever it is between two motions, a stop ends all of it."""
+    async with simulate(homed=True) as sim, Magician.connect(sim.url) as arm:
+        calls = 0
+
+        async def stopping(_: bool = True) -> bool:
+            nonlocal calls
+            calls += 1
+            if calls == at:
+                await arm.stop()
+
+            return True
+
+        with pytest.raises(MotionStopped):
+            await pick_and_place(arm, SOURCE, TARGET, tool=stopping, check=stopping, settle=0)
+
+        assert calls == at
+        assert len(moves(sim)) == {1: 2, 2: 3, 3: 4, 4: 5}[at]
+        assert sim.arm.device.idle

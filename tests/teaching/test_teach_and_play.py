@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from virtual import virtual
 
-from dobot_async import CommandRejected, Magician, MyCobot, Pen, UltraArm, UnsupportedError
+from dobot_async import CommandRejected, Magician, MotionStopped, MyCobot, Pen, UltraArm, UnsupportedError
 from dobot_async.magician import commands as c
 from dobot_async.mycobot import commands as mycobot
 from dobot_async.simulator import simulate
@@ -289,6 +289,42 @@ async def test_it_goes_on_until_it_is_cancelled_and_then_stands() -> None:
         assert len(targets(sim)) > 10
         assert sim.arm.device.idle
         assert "aborted" in {each.outcome for each in sim.arm.executed}
+
+
+@virtual
+async def test_a_path_does_not_go_on_past_a_stop() -> None:
+    """The arm is held still for a while, and nothing is under way when it is stopped."""
+    still, away = (0.0, 30.0, 30.0, 0.0), (20.0, 30.0, 30.0, 0.0)
+    path = PathSample(0, still), PathSample(5, still), PathSample(6, away)
+    async with simulate(homed=True) as sim, Magician.connect(sim.url) as arm:
+        await arm.move_joints(*still)
+        playing = asyncio.create_task(play(arm, Recording("magician", path=path)))
+        await asyncio.sleep(2)
+        assert sim.arm.device.idle
+        await arm.stop()
+        with pytest.raises(MotionStopped):
+            await playing
+
+        assert sim.arm.pose.joints == pytest.approx(still, abs=0.1)
+
+
+@virtual
+async def test_a_stop_while_the_tool_is_told_is_the_end_of_a_playing() -> None:
+    recording = magician(TaughtStep((220, 0, 40, 0), suction=True), TaughtStep((220, 60, 40, 0)))
+    async with simulate(homed=True) as sim, Magician.connect(sim.url) as arm:
+        stops: list[asyncio.Task[None]] = []
+        tell = arm.suction
+
+        async def suction(on: bool, **options: Any) -> None:
+            stops.append(asyncio.create_task(arm.stop()))
+            await tell(on, **options)
+            await stops[0]
+
+        arm.suction = suction  # type: ignore[method-assign]
+        with pytest.raises(MotionStopped):
+            await play(arm, recording)
+
+        assert targets(sim) == [("MOVJ_XYZ", 220, 0, 40)]
 
 
 @virtual
