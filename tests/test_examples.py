@@ -173,6 +173,15 @@ def check_follow_target(output: str) -> None:
     assert place == pytest.approx([200, 0, 40], abs=1)
 
 
+def check_teach_and_play(output: str) -> None:
+    assert numbers(output) == [6]
+
+
+def check_palletise(output: str) -> None:
+    """Without a sensor nothing has a colour, and one pallet has room for four."""
+    assert [line.partition(",")[0] for line in output.splitlines()] == ["stacks a part"] * 4 + ["puts back a part"] * 2
+
+
 CHECKS: dict[str, Callable[[str], None]] = {
     "connect_and_read.py": check_connect_and_read,
     "pick_and_place.py": check_pick_and_place,
@@ -193,6 +202,8 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "rail_pick_and_place.py": check_rail_pick_and_place,
     "svg_drawing.py": check_svg_drawing,
     "follow_target.py": check_follow_target,
+    "teach_and_play.py": check_teach_and_play,
+    "palletise.py": check_palletise,
 }
 
 

@@ -1,7 +1,7 @@
 """The way of the imports, read from the source: layers know nothing of higher ones, and families not of each other.
 
 errors <- wire, util <- transports <- link <- queue <- following <- arms <- families <- discovery <- simulator
-<- toolpath <- cli <- __main__
+<- toolpath, handling <- teaching <- cli <- __main__
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ LAYERS = (
     ("following",),
     ("arms",),
     FAMILIES,
-    ("discovery", "fleet"),
+    ("discovery", "fleet", "hands"),
     ("simulator", "bridge"),
-    ("toolpath",),
+    ("toolpath", "handling"),
+    ("teaching",),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )

@@ -39,7 +39,9 @@ async def run(scene: Scene, name: str, *arguments: str, mount: Mount | None = No
     return done.stdout.splitlines()
 
 
-@pytest.mark.parametrize("name", ["color_sorter.py", "rail_pick_and_place.py", "svg_drawing.py"])
+@pytest.mark.parametrize(
+    "name", ["color_sorter.py", "rail_pick_and_place.py", "svg_drawing.py", "teach_and_play.py", "palletise.py"]
+)
 def test_they_are_short(name: str) -> None:
     assert len((EXAMPLES / name).read_text(encoding="utf-8").splitlines()) < SHORT
 
@@ -89,6 +91,34 @@ async def test_the_drawing_is_on_the_paper() -> None:
     # The lowest point of the curve: three quarters of the way to its control points, 7.5 mm below its ends.
     assert distance((202.5, 0), [point[:2] for point in curve]) < 0.5
     assert length(triangle) == pytest.approx(40 + 30 + 50, abs=2)
+
+
+async def test_what_was_taught_is_played_there_and_back(tmp_path: Path) -> None:
+    scene = Scene(pieces=[Piece("red", (250, 0))])
+    await run(scene, "teach_and_play.py", str(tmp_path / "taught.json"))
+    ways = [(each.kind, round(each.place[1])) for each in scene.events]
+    assert ways == [("picked", 0), ("dropped", 100), ("picked", 100), ("dropped", 0), ("picked", 0), ("dropped", 100)]
+    assert scene.pieces["red"].position == pytest.approx((200, 100, -138), abs=0.1)
+
+
+async def test_parts_are_stacked_by_their_colour() -> None:
+    colors = ("red", "blue", "red", "green", "red", "blue")
+    places = [(x, y) for x in (230, 270) for y in (-20, 0, 20)]
+    small = (18.0, 18.0, 25.0)
+    scene = Scene(
+        pieces=[
+            Piece(f"{n} {color}", at, small, color) for n, (color, at) in enumerate(zip(colors, places, strict=True))
+        ],
+        sensors=[ColorSpot((200, -60, -138), (200, -60, -110), port=ColorPort.GP2, version=V2)],
+    )
+    lines = await run(scene, "palletise.py")
+    assert [line.rpartition(" ")[2] for line in lines] == list(colors)
+    stacks = [
+        [(120, 180, -138), (160, 180, -138), (120, 180, -113)],
+        [(120, -220, -138), (160, -220, -138), (120, -220, -113)],
+    ]
+    for names, stack in ((("0 red", "2 red", "4 red"), stacks[0]), (("1 blue", "3 green", "5 blue"), stacks[1])):
+        assert [scene.pieces[name].position for name in names] == [pytest.approx(place, abs=0.1) for place in stack]
 
 
 def distance(place: tuple[float, float], points: list[tuple[float, float]]) -> float:

@@ -44,6 +44,7 @@ COMMANDS = {
     "jog": ("dobot_async.cli.commands:jog", "Jog in a direction for a time."),
     "monitor": ("dobot_async.cli.monitor:monitor", "Watch pose, queue and alarms."),
     "move": ("dobot_async.cli.commands:move", "Move the tool to a point."),
+    "play": ("dobot_async.cli.teach:play_recording", "Play what an arm was taught."),
     "pose": ("dobot_async.cli.commands:pose", "Tell where tool and joints are, in mm and degrees."),
     "run": ("dobot_async.cli.program:run_program", "Run a program file."),
     "serve": ("dobot_async.cli.serve:serve_on_zenoh", "Put an arm on Zenoh, under a name."),
@@ -52,6 +53,7 @@ COMMANDS = {
     "suction": ("dobot_async.cli.commands:suction", "Switch the suction cup."),
     "write": ("dobot_async.cli.drawing:write_line", "Write a text with a pen."),
     "teleop": ("dobot_async.cli.teleop:teleop", "Lead the arm by keys, or by targets from a pipe."),
+    "teach": ("dobot_async.cli.teach:teach", "Teach the arm, and keep that in a file."),
     "wifi": ("dobot_async.cli.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
 }
 """Where each command is, and what the help says of it."""
