@@ -20,7 +20,7 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_duration
 from dobot_async._core.util.tasks import STAYING, cancel_and_join
-from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, MotionUnknown, another
+from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, MotionUnknown, UnsupportedError, another
 from dobot_async.following.follow import SETTLE, Follow, Pace
 from dobot_async.following.strategy import Strategy
 from dobot_async.layouts import NOTHING
@@ -78,6 +78,9 @@ async def follow_target(
         max_speed: mm/s of the setpoint, above 0.
         max_turn: Degrees/s of angles and joints, above 0.
         stale: Seconds for which a target counts, above 0.
+
+    Raises:
+        UnsupportedError: The arm was connected with a workspace.
     """
     pace = Pace(
         positive(rate, "rate", FASTEST),
@@ -85,6 +88,9 @@ async def follow_target(
         positive(max_turn, "max_turn"),
         positive(stale, "stale"),
     )
+    if queue.kept:
+        raise UnsupportedError("an arm that keeps a workspace follows nothing: its ways are not known in time")
+
     motion = Motion(Unwatched(), Entry(FOLLOWING, None, None))
     motion.call = motion  # it need not be sent to be awaited
     async with queue.roaming():
