@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,6 +11,9 @@ from dobot_async.cli.arms import FAMILIES, chosen
 from dobot_async.cli.family import Told
 from dobot_async.cli.params import DURATION
 from dobot_async.cli.session import Session
+
+if TYPE_CHECKING:
+    from dobot_async.arms.base import Arm
 
 __all__ = ["alarms", "home", "info", "jog", "move", "pose", "stop", "suction"]
 
@@ -42,7 +45,7 @@ def alarms(session: Session, clear: bool) -> None:
     if not session.family.alarms:
         session.only(*(name for name, family in FAMILIES.items() if family.alarms))
 
-    async def question(arm: Any) -> tuple[object, ...]:
+    async def question(arm: Arm) -> tuple[object, ...]:
         if clear:
             await arm.clear_alarms()
 
@@ -130,10 +133,10 @@ def stop(session: Session) -> None:
     session.output.answer({"stopped": True}, "stopped")
 
 
-def move_and_answer(session: Session, what: str, motion: Callable[[Any], Awaitable[None]]) -> None:
+def move_and_answer(session: Session, what: str, motion: Callable[[Arm], Awaitable[None]]) -> None:
     """Waits for a motion, and answers with the pose in which it ended."""
 
-    async def question(arm: Any) -> Told:
+    async def question(arm: Arm) -> Told:
         await motion(arm)
         return await session.family.pose(arm)
 

@@ -6,7 +6,7 @@ import os
 import sys
 from contextlib import aclosing, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +15,9 @@ from dobot_async.cli.failures import StepRefused, WrongFile
 from dobot_async.cli.params import ABOVE_ZERO, DURATION
 from dobot_async.cli.session import Session, run
 from dobot_async.families import REGISTERED
+
+if TYPE_CHECKING:
+    from dobot_async.arms.base import Arm
 
 __all__ = ["play_recording", "teach"]
 
@@ -256,7 +259,7 @@ def play_recording(session: Session, file: Path, speed: float | None, loop: int,
     except RecordingUnfit as error:
         raise WrongFile(f"{file.name}: {error}; nothing was sent") from None
 
-    async def question(arm: Any) -> None:
+    async def question(arm: Arm) -> None:
         try:
             await play(arm, recording, speed=speed, loops=loop or None, reverse=reverse, progress=report)
         except RecordingUnfit as error:

@@ -13,7 +13,7 @@ import sys
 from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,6 +21,9 @@ from dobot_async.cli.failures import StepRefused, WrongFile
 from dobot_async.cli.params import ABOVE_ZERO
 from dobot_async.cli.session import Session, run
 from dobot_async.following import RATE, Follow
+
+if TYPE_CHECKING:
+    from dobot_async.arms.base import Arm
 
 __all__ = ["teleop"]
 
@@ -51,7 +54,7 @@ def teleop(session: Session, rate: float, max_speed: float, joints: bool, play: 
     if keys and joints:
         raise click.UsageError("--joints: keys lead the tool")
 
-    async def led(arm: Any) -> int:
+    async def led(arm: Arm) -> int:
         async with arm.following(rate=rate, max_speed=max_speed) as follow:
             if points is not None:
                 await played(follow, points, joints=joints)
