@@ -1,6 +1,6 @@
 """What a queue and its motions promise, case by case; C5 to C17 of the faults that were found on 2026-11-30.
 
-What ends a download is in `test_standstill` (C6, C7).
+What ends a download is in `test_standstill`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ async def alarmed(b: Bench) -> list[Any]:
     return motions
 
 
-# C5: hooks are isolated.
+# Hooks are isolated.
 
 
 @pytest.mark.parametrize("outgoing", [True, False])
@@ -107,7 +107,7 @@ async def test_several_hooks_hear_all_frames_until_they_are_removed(family: Fami
         assert not heard
 
 
-# C8: join has one deadline, and tells of failures.
+# Join has one deadline, and tells of failures.
 
 
 @each_family
@@ -155,7 +155,7 @@ async def test_join_tells_of_a_failure_that_nobody_has_seen(family: Family) -> N
             await b.arm.queue.join()
 
 
-# C10: an instance per raise.
+# An instance per raise.
 
 
 async def raised_by(motion: Any) -> BaseException:
@@ -226,7 +226,7 @@ async def test_each_call_on_a_lost_link_gets_an_error_of_its_own(family: Family)
         assert len({id(each) for each in errors}) == 4
 
 
-# C11: memory is bounded.
+# Memory is bounded.
 
 
 @each_family
@@ -261,7 +261,7 @@ async def test_commands_whose_motions_nobody_keeps_need_no_memory(family: Family
         assert b.arm.queue.pending == 0
 
 
-# C12: a motion of a batch cannot be awaited before the batch is sent.
+# A motion of a batch cannot be awaited before the batch is sent.
 
 
 @each_family
@@ -276,7 +276,7 @@ async def test_awaiting_a_motion_in_its_own_batch_is_an_error(family: Family) ->
         await b.arm.move_joints(*family.near)
 
 
-# C14: who is stopped while putting hears that.
+# Who is stopped while putting hears that.
 
 
 @pytest.mark.parametrize("later", [0.001, 0.005, 0.01, 0.015, 0.02, 0.03, 0.06, 0.1, 0.2, 0.5])
@@ -309,7 +309,7 @@ async def test_a_put_that_a_stop_interrupts_is_stopped(family: Family, lost: str
         assert not await stands(b.sim)
 
 
-# C17: what can be known of a motion without awaiting it.
+# What can be known of a motion without awaiting it.
 
 
 @each_family
