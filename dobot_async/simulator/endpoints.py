@@ -318,7 +318,8 @@ async def simulate(
         speed: Simulated seconds per second.
         seed: Of the faults.
         faults: What the line does to messages.
-        clock: Simulated seconds; by default the event loop's own time, times `speed`.
+        clock: Simulated seconds; by default the event loop's own time, times `speed`. One that does not run as fast as
+            the loop's has an attribute `speed`, so that what the arm tells of its own clock is right.
         scene: What the arm works in, alone or with others: pieces, belts, sensors, what it can run into.
         mount: How it stands there, and its tool; by default at the origin, with a suction cup.
         details: What else the model takes: `options`, `quirks`; a Magician also `limits` and `homed`.
