@@ -13,6 +13,7 @@ from dobot_async.magician.arm import Magician
 from dobot_async.magician.kinematics import Kinematics
 from dobot_async.teaching.base import Limits, TaughtArm, clip
 from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
+from dobot_async.wire import Command
 
 __all__ = ["MagicianLimits", "TaughtMagician"]
 
@@ -138,17 +139,32 @@ class TaughtMagician(TaughtArm):
             await self.arm.request(c.SET_PTP_COMMON_PARAMS, c.PTPCommonParams(percent, percent))
             await self.arm.request(c.SET_ARC_COMMON_PARAMS, c.ARCCommonParams(percent, percent))
 
-        yield
-        await self.arm.request(c.SET_PTP_COMMON_PARAMS, ptp)
-        await self.arm.request(c.SET_ARC_COMMON_PARAMS, arc)
+        async with self._set_back((c.SET_PTP_COMMON_PARAMS, ptp), (c.SET_ARC_COMMON_PARAMS, arc)):
+            yield
 
     @asynccontextmanager
     async def jogs(self, percent: float) -> AsyncIterator[None]:
         """The ratios of jogs."""
         before = await self.arm.request(c.GET_JOG_COMMON_PARAMS, None)
         await self.arm.request(c.SET_JOG_COMMON_PARAMS, c.JOGCommonParams(percent, percent))
-        yield
-        await self.arm.request(c.SET_JOG_COMMON_PARAMS, before)
+        async with self._set_back((c.SET_JOG_COMMON_PARAMS, before)):
+            yield
+
+    @asynccontextmanager
+    async def _set_back(self, *settings: tuple[Command[Any, None], Any]) -> AsyncIterator[None]:
+        """Set what it was before when the block ends; if that is by an error, without keeping the error waiting."""
+
+        async def tell() -> None:
+            for command, value in settings:
+                await self.arm.request(command, value)
+
+        try:
+            yield
+        except BaseException:
+            self.arm.link.cleanup.start(tell(), "setting the speed back")
+            raise
+
+        await tell()
 
     def jogging(self, direction: str, percent: float) -> AbstractAsyncContextManager[None]:  # noqa: ARG002 - set before
         """Jog until the block ends."""

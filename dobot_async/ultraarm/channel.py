@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from dobot_async._core.link.link import Link
@@ -61,7 +60,10 @@ class Channel:
         """
         await self.link.opened()
         reply = with_errors(command).reply
-        accept: Callable[[Frame], Any] = lambda frame: reply.decode(frame.params)  # noqa: E731
+
+        def accept(frame: Frame) -> Any:
+            return reply.decode(frame.params)
+
         try:
             answer = await self.link.exchange(
                 self.link.frame(command, value, queued=True),

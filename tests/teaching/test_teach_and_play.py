@@ -483,3 +483,19 @@ async def test_wrong_arguments_of_play(options: dict[str, Any], kind: type[Excep
             await play(arm, magician(HERE), **options)
 
         assert sim.arm.counters.requests == before
+
+
+@virtual
+async def test_an_arm_that_is_stopped_at_another_speed_gets_its_own_back() -> None:
+    recording = magician(TaughtStep((220, 0, 40, 0)), TaughtStep((220, 50, 40, 0)))
+    async with simulate(homed=True) as sim, Magician.connect(sim.url) as arm:
+        await arm.set_speed(70, 60)
+        playing = asyncio.create_task(play(arm, recording, speed=10))
+        await asyncio.sleep(0.5)
+        assert await arm.request(c.GET_PTP_COMMON_PARAMS, None) == c.PTPCommonParams(10, 10)
+        await arm.stop()
+        with pytest.raises(MotionStopped):
+            await playing
+
+        await asyncio.sleep(1)
+        assert await arm.request(c.GET_PTP_COMMON_PARAMS, None) == c.PTPCommonParams(70, 60)
