@@ -16,10 +16,10 @@ from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol, TypeVar
 
 from dobot_async._core.link.link import Link
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.motion import Motion
 from dobot_async.arms.info import DeviceInfo
 from dobot_async.following import Follow
-from dobot_async.wire import Command
 
 __all__ = ["Arm", "ArmBatch", "ArmPose", "ArmQueue", "ArmVerbs"]
 

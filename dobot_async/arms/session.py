@@ -8,12 +8,14 @@ from contextlib import asynccontextmanager
 from typing import Any, Protocol, TypeVar
 
 from dobot_async._core.link.link import Link
+from dobot_async._core.protocol.transport import Transport
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_choice, check_duration, check_timeout
 from dobot_async._core.util.tasks import Cleanup, run_shielded
+from dobot_async._core.util.urls import hidden
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTimeout
-from dobot_async.transports import Transport, hidden, open_transport
-from dobot_async.wire import Command
+from dobot_async.transports import open_transport
 
 __all__ = ["arm_session", "check_options", "open_in_time", "run_owned"]
 

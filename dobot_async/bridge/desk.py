@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from dobot_async.bridged import Kind
-from dobot_async.contract import Frame
+from dobot_async._core.protocol.contract import Frame
+from dobot_async.arms.bridge_adapter import Kind
 
 if TYPE_CHECKING:
     from dobot_async.bridge.client import Client

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from dobot_async._core.link.link import Link
+from dobot_async._core.protocol.contract import Frame
 from dobot_async._core.util.tasks import run_shielded
+from dobot_async.arms.bridge_adapter import Bridged
 from dobot_async.bridge.doors import Doors, open_doors
 from dobot_async.bridge.families import family_of
 from dobot_async.bridge.limits import Limits
 from dobot_async.bridge.service import Bridge
-from dobot_async.bridged import Bridged
-from dobot_async.contract import Frame
 from dobot_async.errors import ConnectFailed, DobotError
 
 __all__ = ["bridge"]

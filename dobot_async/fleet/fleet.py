@@ -20,6 +20,12 @@ from typing import Any, Concatenate, ParamSpec, TypeVar, cast, overload
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async._core.util.shapes import Shape
 from dobot_async._core.util.tasks import STAYING
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.magician.queue import Batch
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.mycobot.queue import CobotBatch
+from dobot_async.arms.ultraarm.arm import UltraArm
+from dobot_async.arms.ultraarm.queue import UltraArmBatch
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
 from dobot_async.fleet.cell import read_cell
 from dobot_async.fleet.claims import Party
@@ -30,12 +36,6 @@ from dobot_async.fleet.seat import Member, Seat, tell_to_stop
 from dobot_async.fleet.together import Launch, Together, abandon
 from dobot_async.fleet.work import all_of, named, side_by_side
 from dobot_async.fleet.zones import Program, Run, here, running
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.queue import Batch
-from dobot_async.mycobot.arm import MyCobot
-from dobot_async.mycobot.queue import CobotBatch
-from dobot_async.ultraarm.arm import UltraArm
-from dobot_async.ultraarm.queue import UltraArmBatch
 
 __all__ = ["Fleet", "OnFailure"]
 

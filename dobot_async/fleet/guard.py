@@ -24,6 +24,7 @@ from contextlib import asynccontextmanager, suppress
 from typing import Generic, Literal, Protocol, TypeVar
 
 from dobot_async._core.queue.motion import Motion
+from dobot_async.arms.magician.paths import STEP
 from dobot_async.errors import DobotError
 from dobot_async.fleet.claims import Claim, Party
 from dobot_async.fleet.course import Course, Step
@@ -31,7 +32,6 @@ from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.limits import Limits
 from dobot_async.fleet.planner import Planner, Region, Stance
 from dobot_async.fleet.zones import Zones, here
-from dobot_async.magician.paths import STEP
 
 __all__ = ["Guard", "Mode"]
 

@@ -11,11 +11,11 @@ from typing import Any, cast
 
 import anyio
 
+from dobot_async._core.protocol.contract import LinkState
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.arms.base import Arm
-from dobot_async.contract import LinkState
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.fleet.claims import Claim, Party, Pause
 from dobot_async.fleet.course import Course, Step

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async.program.step import ProgramError, Step
 from dobot_async.program.text import parse_number, shortened
-from dobot_async.wire import Command
 
 __all__ = ["NUMBER", "ON_OFF", "WHOLE", "Kind", "Reader", "Verb", "Vocabulary", "bare", "choice", "takes"]
 

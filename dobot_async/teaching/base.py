@@ -12,7 +12,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any
 
 from dobot_async.errors import CommandRejected, UnsupportedError
-from dobot_async.hands import settle_time, stop_check
+from dobot_async.handling.arms import settle_time, stop_check
 from dobot_async.teaching.recording import Mode, PathSample, Recording, TaughtStep
 
 __all__ = ["Limits", "TaughtArm", "clip"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from dobot_async.magician.kinematics import BEYOND_LIMIT, Unreachable
+from dobot_async.arms.magician.kinematics import BEYOND_LIMIT, Unreachable
 
 __all__ = ["MissingLibrary", "ToolpathFileError", "UnreachableStroke", "library"]
 

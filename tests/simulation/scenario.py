@@ -23,9 +23,9 @@ from judgement import Fate, Jogging, Kind, Record, Standstill, check_jogs, judge
 from observed import Observed
 
 from dobot_async import DobotError, Jog, Magician, PTPMode
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate
-from dobot_async.simulator.work import DeviceOptions
+from dobot_async.simulator.device.work import DeviceOptions
 
 __all__ = ["Outcome", "Plan", "Violation", "run_seed"]
 

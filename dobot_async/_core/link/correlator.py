@@ -32,7 +32,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Any, Generic, TypeVar
 
-from dobot_async.contract import Frame
+from dobot_async._core.protocol.contract import Frame
 from dobot_async.errors import ProtocolError
 
 __all__ = ["Correlator", "Outcome", "Request"]

@@ -23,9 +23,9 @@ from dobot_async._core.link.deadlines import Deadlines, release
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.link.silence import Silence
 from dobot_async._core.link.stragglers import Stragglers
-from dobot_async.contract import Frame, LinkStats
+from dobot_async._core.protocol.contract import Frame, LinkStats
+from dobot_async._core.protocol.transport import Transport
 from dobot_async.errors import ReplyTimeout
-from dobot_async.transports import Transport
 
 __all__ = ["Exchange"]
 

@@ -6,11 +6,11 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any, TypeVar
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import MotionStopped
-from dobot_async.wire import Command
 
 __all__ = ["BatchBuilder", "batch"]
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import ArmAlarm, DobotError, MotionUnknown, ReplyTimeout
-from dobot_async.wire import Command
 
 if TYPE_CHECKING:
     from dobot_async._core.queue.keeper import Keeper

@@ -17,11 +17,11 @@ from collections.abc import AsyncIterable, AsyncIterator, Coroutine, Generator, 
 from contextlib import AbstractContextManager, suppress
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.errors import ArmAlarm, DobotError
-from dobot_async.wire import Command
 
 __all__ = ["Steps", "Stream", "StreamStep"]
 

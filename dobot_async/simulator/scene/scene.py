@@ -19,7 +19,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from dobot_async.families import Parts
+from dobot_async.arms.registry import Parts
 from dobot_async.simulator.scene.geometry import Place3, Placement
 from dobot_async.simulator.scene.seat import Event, SceneArm, Seat
 from dobot_async.simulator.scene.stock import ABOVE_ALL, RunningBelt, Stock, Workpiece

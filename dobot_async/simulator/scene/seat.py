@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from dobot_async.simulator.device import Device
+from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.scene.geometry import Place3, Placement
 from dobot_async.simulator.scene.stock import RunningBelt, Standing, Stock, Workpiece
 from dobot_async.simulator.scene.things import ColorSpot, CupTool, GripperTool, LightBeam, Mount, PenTool, Tool
