@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import AsyncIterator, Callable, Hashable, Sequence
+from collections.abc import AsyncGenerator, Callable, Hashable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from typing import Any, TypeVar
 
@@ -207,7 +207,7 @@ class Link(Exchange[F]):
         await super().aclose()
 
     @asynccontextmanager
-    async def _only(self, what: str, deadline: float) -> AsyncIterator[None]:
+    async def _only(self, what: str, deadline: float) -> AsyncGenerator[None]:
         """While this is entered, a queued command is out, and nothing else."""
         await self._acquire(None, Priority.QUEUED, deadline, what)
         try:
