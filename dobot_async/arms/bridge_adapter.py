@@ -40,6 +40,7 @@ class Watch(Protocol[F]):
     @property
     def question(self) -> F:
         """The request whose answer tells whether the arm has finished."""
+        ...
 
     def sent(self, request: F) -> None:
         """A request that is no read goes out."""
@@ -49,9 +50,11 @@ class Watch(Protocol[F]):
 
     def moving(self, reply: F | None) -> bool:
         """Returns whether the arm is, or may be, in the middle of what it was told; `reply` is that to the question."""
+        ...
 
     def off(self) -> Sequence[F]:
         """Returns what ends, beside `Bridged.stopping`, what the program may have switched on."""
+        ...
 
 
 class Switch:
@@ -114,30 +117,37 @@ class Bridged(Protocol[F]):
     @property
     def model(self) -> str:
         """What `sim:` is to simulate, and what a served arm is called."""
+        ...
 
     @property
     def filler(self) -> bytes:
         """Bytes that end a half frame that the arm waits for."""
+        ...
 
     @property
     def barriers(self) -> Sequence[F]:
         """Cheap reads that harm nobody, of several keys: an answer to one tells what will not be answered any more."""
+        ...
 
     @property
     def greeting(self) -> F:
         """A read that any arm of the family answers."""
+        ...
 
     @property
     def stopping(self) -> Sequence[F]:
         """What stops the arm, and what it was told, and switches off what burns or turns; the stop comes first."""
+        ...
 
     @property
     def proves_stop(self) -> bool:
         """Whether an answer to a stop proves that the arm obeys; else it is looked at until it is seen to stand."""
+        ...
 
     @property
     def insisting(self) -> Sequence[F]:
         """What is said instead to an arm that has heard `stopping` several times and is still seen to move."""
+        ...
 
     @property
     def in_order(self) -> bool:
@@ -146,66 +156,84 @@ class Bridged(Protocol[F]):
         A client then gets its answers in the order of its requests, one for each, and what came behind a request that
         the arm did not answer is dropped.
         """
+        ...
 
     @property
     def denials(self) -> Mapping[str, Collection[Hashable]]:
         """Groups of commands that can be blocked, by name: the subjects of their requests."""
+        ...
 
     @property
     def readings(self) -> Mapping[str, Reading[F]]:
         """What those who only look may like to know, by name; "motion" asks the question of a `Watch`."""
+        ...
 
     @property
     def encode(self) -> Encoder[F]:
         """What makes frames of the family's commands."""
+        ...
 
     async def open(self, url: str, timeout: float) -> Transport:
         """Opens the way to an arm, with the family's manners; raises ConnectFailed if that takes too long."""
+        ...
 
     def parser(self) -> Parser[F]:
         """Returns a parser for what the arm sends."""
+        ...
 
     def requests(self) -> Parser[F]:
         """Returns a parser for what a client sends."""
+        ...
 
     def begins(self, data: bytes) -> bool | None:
         """Returns whether bytes are how a client's first request begins; None while too few of them are there."""
+        ...
 
     def attach(self, link: Link[F], parser: Parser[F]) -> None:
         """Called with a new link to the arm, and the parser of what it sends."""
 
     def watch(self) -> Watch[F]:
         """Returns what follows one program."""
+        ...
 
     def kind(self, request: F) -> Kind:
         """Returns what a request is."""
+        ...
 
     def subject(self, request: F) -> Hashable:
         """Returns what `denials` call a request."""
+        ...
 
     def name(self, request: F) -> str:
         """Returns what people call a request; nothing of its parameters."""
+        ...
 
     def patience(self, request: F) -> float:
         """Returns the seconds that an answer may take."""
+        ...
 
     def repeatable(self, request: F) -> bool:
         """Returns whether it does no harm to send it again: never for what moves anything."""
+        ...
 
     def may_be_silent(self, request: F) -> bool:
         """Returns whether the arm may take a request and answer nothing."""
+        ...
 
     def accept(self, request: F, reply: F) -> F:
         """Returns the reply; raises ProtocolError if it cannot be one to this request."""
+        ...
 
     def check(self, request: F) -> None:
         """Raises ProtocolError for a frame that the arm could not take."""
 
     def aside(self, frame: F) -> bool:
         """Returns whether a frame that nobody waits for is for who moves the arm; else it is late, and for nobody."""
+        ...
 
     def refusal(self, reason: str) -> bytes:
         """Returns what a client is told whose request is not passed on; nothing if the protocol has no word for it."""
+        ...
 
 
 class ByKey(ABC, Generic[F]):

@@ -44,7 +44,7 @@ class Family:
     """
 
     models: tuple[str, ...] = ()
-    public: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    public: Mapping[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     simulator: str = ""
     scene: str = ""
     bridge: str = ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from typing import Any, Protocol, TypeVar
 
@@ -31,10 +31,12 @@ class Session(Protocol):
     @property
     def link(self) -> Link[Any]:
         """The connection."""
+        ...
 
     @property
     def queue(self) -> MotionQueue:
         """The queue of its motions."""
+        ...
 
     async def greet(self, timeout: float) -> None:
         """Prove that the arm answers; raise ConnectFailed, with what to check, if it does not in so many seconds."""
@@ -73,7 +75,7 @@ async def arm_session(
     build: Callable[[Transport, str], S],
     *,
     stop_on_error: bool,
-) -> AsyncIterator[S]:
+) -> AsyncGenerator[S]:
     """Connect to an arm, hold it for the length of a block, and leave it.
 
     Args:

@@ -51,6 +51,7 @@ class Desk(Protocol[F]):
 
     async def answer(self, client: Client[F], request: Request[F]) -> F | None:
         """Returns the arm's reply, None where the arm need not answer; raises Refused, or DobotError."""
+        ...
 
     def refused(self, client: Client[F], name: str, reason: str) -> None:
         """Takes note that a request was not passed on."""

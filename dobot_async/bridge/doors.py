@@ -101,7 +101,7 @@ async def open_doors(
     `refuse` is called with who was not let in, and why.
     """
     authenticator = Authenticator(doors.token, doors.origins, host.family.begins, refuse)
-    urls = []
+    urls: list[str] = []
     for place in doors.places:
         address, port = place.hostname or "", place.port or 0
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Collection, Sequence
+from collections.abc import AsyncGenerator, Collection, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from functools import partial
 from pathlib import Path
@@ -38,7 +38,7 @@ async def bridge(
     limits: Limits | None = None,
     family: str = "magician",
     timeout: float = 5.0,
-) -> AsyncIterator[Bridge[Any]]:
+) -> AsyncGenerator[Bridge[Any]]:
     """Gives an arm to programs on a network for the length of a block.
 
     Args:

@@ -72,7 +72,7 @@ def parse_cell_program(lines: Iterable[str], cell: Cell) -> CellProgram:
     """
     barriers: dict[str, tuple[str, ...]] = {}
     parts = {name: Part(name, member, cell, barriers) for name, member in cell.members.items()}
-    problems = []
+    problems: list[tuple[int, str]] = []
     for number, written in enumerate(lines, 1):
         text = bare(written)
         if not text:

@@ -56,6 +56,7 @@ class Host(Protocol[P]):
             hold: Called with True it lets the client wait, with False go on; datagrams get lost instead.
             name: Who it is, for people.
         """
+        ...
 
     def leave(self, client: P) -> None:
         """Called once, when the client has gone."""
@@ -95,7 +96,7 @@ class Port(Generic[P]):
     host: Host[P]
     tls: ssl.SSLContext | None
     scheme: str
-    handshakes: set[Handshake] = field(default_factory=set)
+    handshakes: set[Handshake] = field(default_factory=set[Handshake])
     closed: bool = False
 
     async def aclose(self) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import asynccontextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -100,7 +100,7 @@ class FleetMagician(Magician):
             await super().set_rail(on=on, **options)
 
     @asynccontextmanager
-    async def jogging(self, direction: Jog | str) -> AsyncIterator[None]:
+    async def jogging(self, direction: Jog | str) -> AsyncGenerator[None]:
         """Jogs until the block ends, once the fleet allows it; see `Magician.jogging`.
 
         Raises:
@@ -123,7 +123,7 @@ class FleetMyCobot(MyCobot):
         self.queue: FleetCobotQueue = FleetCobotQueue(self._executor, self.model)
 
     @asynccontextmanager
-    async def jogging(self, direction: str, **options: Any) -> AsyncIterator[None]:
+    async def jogging(self, direction: str, **options: Any) -> AsyncGenerator[None]:
         """Jogs until the block ends, once the fleet allows it; see `MyCobot.jogging`."""
         async with self.queue.roaming(), super().jogging(direction, **options):
             yield
@@ -143,7 +143,7 @@ class FleetUltraArm(UltraArm):
         return self._runner.state.homed
 
     @asynccontextmanager
-    async def jogging(self, direction: UltraArmJog | str, **options: Any) -> AsyncIterator[None]:
+    async def jogging(self, direction: UltraArmJog | str, **options: Any) -> AsyncGenerator[None]:
         """Jogs until the block ends, once the fleet allows it; see `UltraArm.jogging`."""
         async with self.queue.roaming(), super().jogging(direction, **options):
             yield

@@ -12,7 +12,7 @@ Coordinates are each arm's own; its base frame turns those of the cell into them
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar, cast, overload
@@ -347,7 +347,7 @@ class Fleet(Crew[A]):
     def together(self, *names: str, timeout: float | None = None) -> AbstractAsyncContextManager[Together[Any]]: ...
 
     @asynccontextmanager
-    async def together(self, *names: str, timeout: float | None = None) -> AsyncIterator[Together[Any]]:
+    async def together(self, *names: str, timeout: float | None = None) -> AsyncGenerator[Together[Any]]:
         """Collects a batch for each of several arms, and starts them at one instant when the block ends.
 
         The arms first finish what they have to do. Motions return as usual; `start` and `skew` of what this yields tell

@@ -41,12 +41,14 @@ class Asked(Protocol):
     @property
     def restarts(self) -> int:
         """How often it was seen to have been switched off and on."""
+        ...
 
     async def check_restart(self) -> None:
         """Raise MotionUnknown if it was switched off and on since this was asked last; its motions end."""
 
     async def request(self, command: Command[Q, R], value: Q) -> R:
         """Send any row of the command table immediately, and return the arm's answer."""
+        ...
 
 
 class Homing(NamedTuple):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncGenerator, Generator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any, SupportsFloat
 
@@ -52,7 +52,7 @@ class Unwatched:
         """Do nothing."""
 
     @contextmanager
-    def watching(self) -> Iterator[None]:
+    def watching(self) -> Generator[None]:
         """Do nothing."""
         yield
 
@@ -67,7 +67,7 @@ async def follow_target(
     max_speed: SupportsFloat,
     max_turn: SupportsFloat,
     stale: SupportsFloat,
-) -> AsyncIterator[Follow]:
+) -> AsyncGenerator[Follow]:
     """Let an arm follow a target for the length of the block; see `arm.following`.
 
     Args:

@@ -41,6 +41,9 @@ CLOSED = 3.0
 POSES = (Pose, CobotPose, u.UltraArmPose)
 
 
+Release = Callable[[Any], Awaitable[None]]
+
+
 @dataclass(frozen=True, slots=True)
 class Hand:
     """What a family of arms has to be known for to handle parts.
@@ -58,7 +61,9 @@ class Hand:
     straight: Callable[[Any, Any], Awaitable[None]]
     check: Callable[[Any, Any], None]
     settle: Mapping[str, float]
-    release: Mapping[str, Callable[[Any], Awaitable[None]]] = field(default_factory=dict)
+    release: Mapping[str, Callable[[Any], Awaitable[None]]] = field(
+        default_factory=dict[str, Callable[[Any], Awaitable[None]]]
+    )
     lacks: frozenset[str] = frozenset()
 
 

@@ -76,7 +76,7 @@ class Verb:
     call: Callable[..., Result]
     arguments: tuple[tuple[str, Kind], ...] = ()
     needed: int = 0
-    options: Mapping[str, Kind] = field(default_factory=dict)
+    options: Mapping[str, Kind] = field(default_factory=dict[str, Kind])
 
     def usage(self, name: str) -> str:
         """How it is written."""
@@ -112,7 +112,8 @@ class Vocabulary:
             ProgramError: Lines are wrong.
         """
         reader = self.reader(options)
-        steps, problems = [], []
+        steps: list[Step] = []
+        problems: list[tuple[int, str]] = []
         for number, written in enumerate(lines, 1):
             text = bare(written)
             if text:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -116,7 +116,7 @@ async def simulate(
     scene: Scene | None = None,
     mount: Mount | None = None,
     **details: Any,
-) -> AsyncIterator[Simulation[Any]]:
+) -> AsyncGenerator[Simulation[Any]]:
     """Runs a simulated arm for the length of a block.
 
     Args:

@@ -35,6 +35,7 @@ class Session(Protocol):
 
     def receive(self, data: bytes) -> bytes:
         """Takes bytes of requests, returns those of all replies to what is whole now."""
+        ...
 
 
 class Simulation(Generic[A]):

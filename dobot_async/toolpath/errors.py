@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 from dobot_async.arms.magician.kinematics import BEYOND_LIMIT, Unreachable
@@ -54,7 +54,7 @@ class UnreachableStroke(Unreachable):
 
 
 @contextmanager
-def library() -> Iterator[None]:
+def library() -> Generator[None]:
     """Around the import of a library of the extra: say which extra it is in if it is missing."""
     try:
         yield

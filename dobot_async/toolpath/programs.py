@@ -60,6 +60,7 @@ class Program(Protocol):
 
     def instructions(self, moves: Iterable[Move]) -> Iterator[Instruction]:
         """Yield the commands of a whole drawing, in order."""
+        ...
 
 
 class MagicianProgram:

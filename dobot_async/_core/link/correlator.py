@@ -128,7 +128,7 @@ class Correlator(Generic[F]):
         proves: bool = True,
     ) -> Request[F]:
         """Note that a request goes out now."""
-        kept = [] if held else None
+        kept: list[Any] | None = [] if held else None
         request = Request(key, accept, next(self._numbers), self._clock(), kept, expected, proves and not held)
         self._outstanding.append(request)
         return request

@@ -18,10 +18,12 @@ class Frame(Protocol):
     @property
     def key(self) -> Hashable:
         """What requests and replies are matched by."""
+        ...
 
     @property
     def params(self) -> bytes:
         """The parameters, for the command's layout."""
+        ...
 
     def __bytes__(self) -> bytes: ...
 
@@ -38,9 +40,11 @@ class Parser(Protocol[F]):
 
     def feed(self, data: bytes) -> list[F]:
         """Takes the next bytes of the stream, returns the frames that they complete."""
+        ...
 
     def resync(self) -> list[F]:
         """Gives up an incomplete frame, returns the frames found inside of it."""
+        ...
 
     def reset(self) -> None:
         """Forgets an incomplete frame: another stream begins."""
@@ -51,6 +55,7 @@ class Encoder(Protocol[F_co]):
 
     def __call__(self, command: Command[Any, Any], params: bytes, *, queued: bool) -> F_co:
         """Returns the frame; raises ValueError where the arm cannot take it so."""
+        ...
 
 
 class LinkState(enum.Enum):

@@ -27,6 +27,7 @@ class Transport(Protocol):
     @property
     def reorder_window(self) -> float:
         """See above; it may change with the link."""
+        ...
 
     async def send(self, data: bytes) -> None:
         """Send all bytes of one frame; wait while the line cannot take them.
@@ -46,6 +47,7 @@ class Transport(Protocol):
             anyio.EndOfStream: The other side ended it.
             anyio.BrokenResourceError: It broke.
         """
+        ...
 
     async def aclose(self) -> None:
         """Close it; it may be called again."""
@@ -65,6 +67,7 @@ class NowaitTransport(Protocol):
 
     def write(self, data: bytes) -> bool:
         """Send all bytes of one frame before it returns; return False if it cannot, and nothing was sent."""
+        ...
 
 
 def nowait_writer(transport: Transport) -> Callable[[bytes], bool]:

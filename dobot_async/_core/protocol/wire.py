@@ -61,9 +61,11 @@ class Layout(Protocol[T]):
 
     def encode(self, value: T) -> bytes:
         """Returns the bytes of a value; raises ValueError or TypeError where it does not fit."""
+        ...
 
     def decode(self, data: bytes) -> T:
         """Returns the value of exactly these bytes; raises ProtocolError where they are none."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +243,8 @@ class Record(Generic[T]):
 
     def cut(self, numbers: tuple[Any, ...]) -> list[Any]:
         """The values of the fields, cut out of the numbers."""
-        values, at = [], 0
+        values: list[Any] = []
+        at = 0
         for field in self.fields.values():
             count = len(field.codes)
             values.append(field.build(numbers[at : at + count]))

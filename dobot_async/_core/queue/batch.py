@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from typing import Any, TypeVar
 
@@ -40,7 +40,7 @@ class BatchBuilder:
 
 
 @asynccontextmanager
-async def batch(queue: MotionQueue, builder: B, timeout: float | None) -> AsyncIterator[B]:
+async def batch(queue: MotionQueue, builder: B, timeout: float | None) -> AsyncGenerator[B]:
     """Queue what the block collects, with nothing between it, when the block ends; an error or a stop sends none."""
     timeout, epoch = check_timeout(timeout), queue.epoch
     try:

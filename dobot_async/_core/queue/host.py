@@ -36,6 +36,7 @@ class MotionRunner(Protocol):
 
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
         """Return a checked entry; see `Executor.prepare`."""
+        ...
 
     async def run(self, entry: Entry) -> None:
         """Do one command, sent once, and return when it is done.

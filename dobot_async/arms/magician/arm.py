@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Coroutine
+from collections.abc import AsyncGenerator, Coroutine
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
 from functools import partial
@@ -111,7 +111,7 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
         reconnect: bool = False,
         reply_timeout: float | tuple[float, float] = (0.02, 0.5),
         workspace: Workspace | Box | Cylinder | None = None,
-    ) -> AsyncIterator[Self]:
+    ) -> AsyncGenerator[Self]:
         """Connects to an arm for the length of a block.
 
         It never clears alarms, sets parameters or moves on its own.

@@ -26,6 +26,7 @@ class Ask(Protocol):
 
     def __call__(self, command: Command[Q, R], value: Q | None = None) -> Awaitable[R]:
         """Return the answer."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext, suppress
 from typing import Any
 
@@ -52,7 +52,7 @@ class Led:
             await anyio.sleep(seconds)
 
     @asynccontextmanager
-    async def jogging(self, direction: Jog | str) -> AsyncIterator[None]:
+    async def jogging(self, direction: Jog | str) -> AsyncGenerator[None]:
         """Jog until the block ends, however it ends; the stop is repeated until the arm has heard it. Manual 2.10.4.
 
         Args:

@@ -97,7 +97,7 @@ class JointLimits:
 
     def problems(self, joints: tuple[float, ...]) -> list[str]:
         """Returns what is wrong with these joints, a phrase for each; empty if nothing is."""
-        found = []
+        found: list[str] = []
         for number, angle in enumerate(joints, start=1):
             low, high = (self.j1, self.j2, self.j3, self.j4)[number - 1]
             where = ""

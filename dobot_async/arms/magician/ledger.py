@@ -56,7 +56,7 @@ class QueueLedger:
     """See the module."""
 
     last: int | None = None
-    unacked: list[UnackedCommand] = field(default_factory=list)
+    unacked: list[UnackedCommand] = field(default_factory=list[UnackedCommand])
 
     @property
     def highest(self) -> int | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Coroutine, Iterable, Sequence
+from collections.abc import AsyncGenerator, Coroutine, Iterable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any, Literal, TypeVar
 
@@ -172,7 +172,7 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
         return batch(self, Batch(self), timeout)
 
     @asynccontextmanager
-    async def download(self, *, loops: int = 1) -> AsyncIterator[Program]:
+    async def download(self, *, loops: int = 1) -> AsyncGenerator[Program]:
         """Store the commands of the block in the arm, which runs them when its key is pressed. Manual 2.19.4.
 
         A cancellation or a stop ends it, and the arm executes again what it is told. After power-up the arm knows of no

@@ -8,6 +8,7 @@ The arm keeps all of it without power. The password is written and never read.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv4Network
 from typing import Any
@@ -104,7 +105,7 @@ class WiFi:
         if not ssid:
             raise ValueError("the network's name (SSID) must not be empty")
 
-        steps: tuple[tuple[Command[Any, None], Any], ...] = (
+        steps: Sequence[tuple[Command[Any, None], Any]] = (
             (c.SET_WIFI_CONFIG_MODE, True),
             (c.SET_WIFI_SSID, ssid),
             (c.SET_WIFI_PASSWORD, password),

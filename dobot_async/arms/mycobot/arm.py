@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Coroutine, Mapping
+from collections.abc import AsyncGenerator, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal, Self, TypeVar, cast
@@ -103,7 +103,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         limits: Mapping[str, Range] | None = None,
         gap: float = GAP,
         workspace: Workspace | Box | Cylinder | None = None,
-    ) -> AsyncIterator[Self]:
+    ) -> AsyncGenerator[Self]:
         """Connect to an arm for the length of a block.
 
         It never clears errors, sets parameters, powers the arm on or moves it on its own.
@@ -274,7 +274,7 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
             await anyio.sleep(seconds)
 
     @asynccontextmanager
-    async def jogging(self, direction: str, *, speed: int = SPEED) -> AsyncIterator[None]:
+    async def jogging(self, direction: str, *, speed: int = SPEED) -> AsyncGenerator[None]:
         """Jog until the block ends, however it ends; the stop is repeated until the arm says that it stands.
 
         A block that ends well is followed by an error if the arm did not jog until its end.

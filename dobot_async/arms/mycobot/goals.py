@@ -53,7 +53,7 @@ class Goals:
     def coords(self, expected: Mapping[int, float]) -> Goal:
         """Coordinates, by their places."""
         whole = len(expected) == 6
-        turning = frozenset() if whole else frozenset({3, 4, 5})
+        turning = frozenset[int]() if whole else frozenset({3, 4, 5})
         tolerances = (self.mm, self.mm, self.mm, self.degrees)
         return Goal(c.GET_COORDS, expected, tolerances, rotation=whole, round=turning)
 

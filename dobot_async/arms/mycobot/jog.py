@@ -8,7 +8,7 @@ JOG ... [block] ... IS_MOVING, STOP, look, STOP, look        the question goes o
 from __future__ import annotations
 
 import re
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -117,7 +117,7 @@ class Jogged:
 @asynccontextmanager
 async def jogging(
     channel: Channel, runner: CobotRunner, direction: str, jog: Jog, queue: MotionQueue
-) -> AsyncIterator[None]:
+) -> AsyncGenerator[None]:
     """Jog while the block lasts; see `MyCobot.jogging`."""
     (command, value), epoch = jog, queue.epoch
     await queue.update()

@@ -263,7 +263,8 @@ def decode(parts: Sequence[tuple[str, Fixed, Any]], data: bytes, sizes: Sizes) -
     if widths is None:
         raise ProtocolError(f"{len(data)} bytes of parameters do not fit")
 
-    values, at = [], 0
+    values: list[Any] = []
+    at = 0
     for (name, fixed, kind), width in zip(parts, widths, strict=True):
         try:
             values.append(fixed.decode(data[at : at + width], kind) if width or not fixed.optional else None)

@@ -111,7 +111,7 @@ def coordinates(count: int, title: str, **given: SupportsFloat | None) -> Given:
         if given[axis] is not None:
             raise ValueError(f"{axis}: a {title} has {', '.join(AXES[:count])} only")
 
-    found = []
+    found: list[float | None] = []
     for axis in AXES[:count]:
         value = given[axis]
         number = None if value is None else to_float(value, axis)

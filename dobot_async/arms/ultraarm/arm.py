@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncGenerator, Callable, Coroutine
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
@@ -98,7 +98,7 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
         home_switches: tuple[int, int, int] | None = (1, 1, 1),
         on_stop: Literal["release", "finish"] = "release",
         workspace: Workspace | Box | Cylinder | None = None,
-    ) -> AsyncIterator[Self]:
+    ) -> AsyncGenerator[Self]:
         """Connect to an arm for the length of a block.
 
         It never sets parameters or moves on its own.
@@ -255,7 +255,7 @@ class UltraArm(Readings, Verbs[Coroutine[Any, Any, None]]):
             await anyio.sleep(seconds)
 
     @asynccontextmanager
-    async def jogging(self, direction: UltraArmJog | str, *, speed: float = SPEED) -> AsyncIterator[None]:
+    async def jogging(self, direction: UltraArmJog | str, *, speed: float = SPEED) -> AsyncGenerator[None]:
         """Jog until the block ends, however it ends; the stop is repeated until that is seen. Manual 5, M13 to M15.
 
         What moves nothing, such as `suction`, can be done meanwhile.

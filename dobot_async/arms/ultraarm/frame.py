@@ -151,7 +151,7 @@ class Parser:
         text = printable(data)
         self.junk_bytes += len(data) - len(text)
         buffer = self._buffer + text
-        frames = []
+        frames: list[Frame] = []
         at = 0
         for found in CLOSING.finditer(buffer):
             frames.append(Frame(b"", buffer[at : found.end()].strip()))

@@ -69,7 +69,7 @@ def parse_gcode(
     """
     reader = Reader(limits, keeper)
     found: list[GCodeLine] = []
-    wrong = []
+    wrong: list[tuple[int, str]] = []
     for number, written in enumerate(lines_of(source), 1):
         try:
             for command, value in reader.read(bare(written)):

@@ -23,7 +23,8 @@ def bare(line: str) -> str:
     if "\n" in line or "\r" in line:
         raise ValueError(f"{shortened(line)!r} has a line break in it")
 
-    pieces, at = [], 0
+    pieces: list[str] = []
+    at = 0
     while (begins := BEGINNING.search(line, at)) and begins[0] == "(":
         ends = line.find(")", begins.end())
         if ends < 0:

@@ -53,21 +53,26 @@ class Goal(Protocol):
     @property
     def needs_angles(self) -> bool:
         """Whether the joints tell of it."""
+        ...
 
     def distance(self, status: Status) -> float | None:
         """Return by how many mm or degrees the arm misses it on its worst axis; None where it does not tell."""
+        ...
 
     def reached(self, status: Status, tolerance: float, *, set_out: bool) -> bool:
         """Return whether an arm at rest has reached it; `set_out` says that something was seen to move."""
+        ...
 
     def come_to(self, before: Status | None, here: Status, tolerance: float) -> bool:
         """Return whether an arm at rest has come to it, and not only stands near it, where it stood before.
 
         If in doubt it has not: to be told once more where it stands moves an arm by no more than the tolerance.
         """
+        ...
 
     def missed(self, status: Status, *, set_out: bool) -> Fault:
         """Return what to say of an arm that rests elsewhere."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ M9 --> at rest? --> M13/M14 --> does it set out? --> (the block, M9, M9, ...) --
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager, suppress
 from enum import Enum
 
@@ -82,7 +82,7 @@ class Jogger:
     @asynccontextmanager
     async def jogging(
         self, command: Command[c.JogMove, Receipt], value: c.JogMove, queue: MotionQueue
-    ) -> AsyncIterator[None]:
+    ) -> AsyncGenerator[None]:
         """Jog until the block ends, or a stop of the queue comes; see `UltraArm.jogging`."""
         runner, epoch = self._runner, queue.epoch
         runner.state.check(command)

@@ -9,7 +9,7 @@ each arm, whatever the others do.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -50,7 +50,7 @@ class Chosen:
         return self.session.output
 
     @asynccontextmanager
-    async def fleet(self, trace: TraceFile | None) -> AsyncIterator[Fleet[Any]]:
+    async def fleet(self, trace: TraceFile | None) -> AsyncGenerator[Fleet[Any]]:
         """Connects to all arms; the trace begins when they are connected."""
         cell = self.cell
         async with Fleet.connect(cell.members, zones=cell.zones, groups=cell.groups) as fleet:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import sys
 import time
-from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Mapping
+from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
@@ -235,7 +235,7 @@ async def watch(arm: Magician, work: Work, draw: Callable[[Mapping[str, str]], N
 
 
 @asynccontextmanager
-async def alongside(work: Coroutine[Any, Any, None]) -> AsyncIterator[None]:
+async def alongside(work: Coroutine[Any, Any, None]) -> AsyncGenerator[None]:
     """Lets work go on beside a block, and ends it with the block; raises what it failed with if the block did not."""
     task = asyncio.create_task(work)
     try:

@@ -7,7 +7,7 @@ Whatever ends a drawing before its end tells with which `--from-stroke` the rest
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
@@ -149,7 +149,7 @@ def make(
 
 
 @contextmanager
-def refused(name: str) -> Iterator[None]:
+def refused(name: str) -> Generator[None]:
     """What goes wrong in this block is told in one line: nothing was sent."""
     try:
         yield

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
-from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,7 +76,7 @@ def teleop(session: Session, rate: float, max_speed: float, joints: bool, play: 
 
 def read_points(path: Path) -> list[tuple[float, list[float]]]:
     """The points of a trajectory: a line has seconds, and a target; raise WrongFile for another one."""
-    points = []
+    points: list[tuple[float, list[float]]] = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         try:
             numbers = numbers_of(line)
@@ -161,7 +161,7 @@ async def lead_by_keys(follow: Follow, held: Mapping[str, float], rate: float, m
 
 
 @contextmanager
-def one_by_one(descriptor: int) -> Iterator[None]:
+def one_by_one(descriptor: int) -> Generator[None]:
     """While this is entered a terminal gives each key at once, and does not show it."""
     try:
         import termios

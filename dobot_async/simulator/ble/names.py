@@ -62,6 +62,7 @@ class Service(Protocol):
     @property
     def scanning(self) -> bool:
         """Whether anybody scans."""
+        ...
 
     def answer(self, call: Message, signature: str = "", *body: Any) -> None:
         """Answers a call."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import socket
 import tempfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,7 @@ CONFIGURATION = """<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-Bus Bus Con
 
 
 @asynccontextmanager
-async def dbus_daemon() -> AsyncIterator[tuple[str, asyncio.subprocess.Process]]:
+async def dbus_daemon() -> AsyncGenerator[tuple[str, asyncio.subprocess.Process]]:
     """Runs a bus for the length of a block; yields its address and its process.
 
     Raises:

@@ -10,7 +10,7 @@ import asyncio
 import itertools
 import os
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -81,7 +81,7 @@ class Rig:
 
 
 @asynccontextmanager
-async def rig() -> AsyncIterator[Rig]:
+async def rig() -> AsyncGenerator[Rig]:
     """Runs a rig for the length of a block; this process, and what it starts, takes its bus for the system's.
 
     Raises:
@@ -126,7 +126,7 @@ class Shared:
         self._rig: Rig | None = None
 
     @asynccontextmanager
-    async def use(self) -> AsyncIterator[Rig]:
+    async def use(self) -> AsyncGenerator[Rig]:
         """Yields the rig; the first one starts it, the last one ends it."""
         async with self._changing:
             if self._rig is None:

@@ -25,13 +25,16 @@ class Curve(Protocol):
     @property
     def length(self) -> float:
         """The way of the tool in mm."""
+        ...
 
     @property
     def turn(self) -> float:
         """The way of that angle, in degrees, that turns most."""
+        ...
 
     def point(self, share: float) -> Vector:
         """Returns the point at a share, 0 to 1, of the way."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

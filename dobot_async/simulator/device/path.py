@@ -36,9 +36,11 @@ class Solver(Protocol):
 
     def forward(self, joints: Vector) -> Vector:
         """Returns the point of these joints."""
+        ...
 
     def inverse(self, point: Vector) -> Vector:
         """Returns the joints of this point; raises Fault where there are none or limits forbid them."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

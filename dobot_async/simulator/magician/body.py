@@ -32,7 +32,7 @@ class Program:
     """The program in the arm's flash: how often it runs, and its commands with their parameters. Manual 2.19.4."""
 
     loops: int = 1
-    commands: list[tuple[Command[Any, Any], Any]] = field(default_factory=list)
+    commands: list[tuple[Command[Any, Any], Any]] = field(default_factory=list[tuple[Command[Any, Any], Any]])
 
 
 class MagicianBody:

@@ -78,6 +78,7 @@ class Solver(Protocol):
 
     def forward(self, joints: Sequence[float]) -> Vector:
         """Returns the flange's point."""
+        ...
 
     def inverse(
         self,
@@ -88,6 +89,7 @@ class Solver(Protocol):
         seeds: bool = True,
     ) -> Vector | None:
         """Returns joints within their limits, near some others, that reach a point; None if none were found."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,7 +97,7 @@ class Registers:
     fan: bool = True
     gripper: int | None = 0
     speed_mode: int = 2
-    servo: dict[tuple[int, int], int] = field(default_factory=dict)
+    servo: dict[tuple[int, int], int] = field(default_factory=dict[tuple[int, int], int])
     closed: int = 20
     stroke: tuple[float, float, float] = (0.0, 0.0, 1.0)
     constant_speed: bool = False

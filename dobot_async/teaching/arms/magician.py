@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any
 
@@ -131,7 +131,7 @@ class TaughtMagician(TaughtArm):
         await self.arm.move_joints(j1, j2, j3, j4)
 
     @asynccontextmanager
-    async def at_speed(self, percent: float | None) -> AsyncIterator[None]:
+    async def at_speed(self, percent: float | None) -> AsyncGenerator[None]:
         """The ratios of PTP and of arcs."""
         ptp = await self.arm.request(c.GET_PTP_COMMON_PARAMS, None)
         arc = await self.arm.request(c.GET_ARC_COMMON_PARAMS, None)
@@ -143,7 +143,7 @@ class TaughtMagician(TaughtArm):
             yield
 
     @asynccontextmanager
-    async def jogs(self, percent: float) -> AsyncIterator[None]:
+    async def jogs(self, percent: float) -> AsyncGenerator[None]:
         """The ratios of jogs."""
         before = await self.arm.request(c.GET_JOG_COMMON_PARAMS, None)
         await self.arm.request(c.SET_JOG_COMMON_PARAMS, c.JOGCommonParams(percent, percent))
@@ -151,7 +151,7 @@ class TaughtMagician(TaughtArm):
             yield
 
     @asynccontextmanager
-    async def _set_back(self, *settings: tuple[Command[Any, None], Any]) -> AsyncIterator[None]:
+    async def _set_back(self, *settings: tuple[Command[Any, None], Any]) -> AsyncGenerator[None]:
         """Set what it was before when the block ends; if that is by an error, without keeping the error waiting."""
 
         async def tell() -> None:

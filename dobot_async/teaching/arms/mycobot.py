@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 
 from dobot_async.arms.mycobot.arm import MyCobot
@@ -95,7 +95,7 @@ class TaughtCobot(TaughtArm):
         return self.arm.jogging(direction, speed=whole(percent))
 
     @asynccontextmanager
-    async def released(self) -> AsyncIterator[None]:
+    async def released(self) -> AsyncGenerator[None]:
         """Damped where the firmware can; it holds again at the end, however that comes."""
         self.check_idle()
         async with self.arm.link.cleanup.at_end(self.arm.focus, "holding the joints again"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 
 from dobot_async.arms.ultraarm import commands as c
@@ -83,7 +83,7 @@ class TaughtUltraArm(TaughtArm):
         return self.arm.jogging(direction, speed=feed(percent))
 
     @asynccontextmanager
-    async def released(self) -> AsyncIterator[None]:
+    async def released(self) -> AsyncGenerator[None]:
         """M17, and M18 at the end, after which it has to be homed.
 
         Raises:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import re
 import sys
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncGenerator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -127,7 +127,7 @@ scans: WeakKeyDictionary[asyncio.AbstractEventLoop, dict[str | None, Scan]] = We
 
 
 @asynccontextmanager
-async def listening(adapter: str | None = None) -> AsyncIterator[asyncio.Queue[Seen]]:
+async def listening(adapter: str | None = None) -> AsyncGenerator[asyncio.Queue[Seen]]:
     """Scans for the length of a block, and yields where everything that is seen arrives, again and again.
 
     Raises:
