@@ -17,7 +17,6 @@ from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass
 from typing import Any
 
-from dobot_async.arms.vocabularies import VOCABULARIES
 from dobot_async.cli.failures import StepRefused
 from dobot_async.cli.program_files import execute
 from dobot_async.errors import DobotError
@@ -25,7 +24,7 @@ from dobot_async.fleet.cell import Cell
 from dobot_async.fleet.families import family_of
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.fleet.seat import Member
-from dobot_async.program import ProgramError, Step
+from dobot_async.program import VOCABULARIES, ProgramError, Step
 from dobot_async.program.text import shortened
 from dobot_async.program.vocabulary import Reader, bare
 

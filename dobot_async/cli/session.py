@@ -17,14 +17,13 @@ from typing import Any, Literal, TypeVar
 
 import click
 
-from dobot_async.arms.vocabularies import VOCABULARIES
 from dobot_async.cli.arms import FAMILIES
 from dobot_async.cli.credentials import with_token
 from dobot_async.cli.failures import Interrupted
 from dobot_async.cli.family import Family
 from dobot_async.cli.output import Output
 from dobot_async.cli.trace import Trace, traced, tracing
-from dobot_async.program import Vocabulary
+from dobot_async.program import VOCABULARIES, Vocabulary
 from dobot_async.transports import SCHEMES
 
 __all__ = ["Session", "run"]

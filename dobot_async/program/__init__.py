@@ -9,7 +9,11 @@ vocabulary of its family, `vocabulary.py` beside its verbs; no arm is known here
 
 from __future__ import annotations
 
+from dobot_async.arms.registry import Parts
 from dobot_async.program.step import ProgramError, Step
 from dobot_async.program.vocabulary import Vocabulary
 
-__all__ = ["ProgramError", "Step", "Vocabulary"]
+__all__ = ["VOCABULARIES", "ProgramError", "Step", "Vocabulary"]
+
+VOCABULARIES: Parts[Vocabulary] = Parts("program")
+"""What programs are written in, by the words of the families and their models."""

@@ -22,8 +22,8 @@ from click.testing import CliRunner
 from dobot_async import Command, Magician, Pen
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import Parser
-from dobot_async.arms.vocabularies import VOCABULARIES
 from dobot_async.cli.main import cli
+from dobot_async.program import VOCABULARIES
 from dobot_async.simulator import Simulation, simulate
 
 MODULE = (sys.executable, "-W", "error", "-m", "dobot_async")

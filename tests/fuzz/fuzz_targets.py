@@ -16,8 +16,8 @@ from dobot_async._core.protocol.wire import Layout
 from dobot_async.arms.magician import alarms
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import HEADER, MAX_LENGTH, OVERHEAD, Frame, Parser
-from dobot_async.arms.vocabularies import VOCABULARIES
 from dobot_async.errors import ProtocolError
+from dobot_async.program import VOCABULARIES
 from dobot_async.simulator import DeviceOptions, Quirks, SimulatedMagician
 
 __all__ = ["TARGETS"]

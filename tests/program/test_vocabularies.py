@@ -13,8 +13,7 @@ from dobot_async.arms.magician import commands as c
 from dobot_async.arms.mycobot import commands as m
 from dobot_async.arms.mycobot.models import MODELS
 from dobot_async.arms.ultraarm import commands as u
-from dobot_async.arms.vocabularies import VOCABULARIES
-from dobot_async.program import ProgramError, Step
+from dobot_async.program import VOCABULARIES, ProgramError, Step
 from dobot_async.program.text import LARGEST, lines_in, parse_number, read_text, shortened
 
 

@@ -18,11 +18,10 @@ from typing import Any
 import click
 
 from dobot_async.arms.registry import REGISTERED
-from dobot_async.arms.vocabularies import VOCABULARIES
 from dobot_async.cli.params import PROGRAM, Text
 from dobot_async.cli.program_files import checked, execute
 from dobot_async.cli.session import Session
-from dobot_async.program import Step
+from dobot_async.program import VOCABULARIES, Step
 from dobot_async.program.text import lines_in
 
 __all__ = ["run_program"]
