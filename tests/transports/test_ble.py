@@ -57,6 +57,7 @@ from dobot_async.simulator.ble.names import ADAPTER
 from dobot_async.simulator.ble.testbed import Rig, rig
 from dobot_async.transports.ble import diagnostics as ble_advice
 from dobot_async.transports.ble import lock as ble_claim
+from dobot_async.transports.ble import opening
 from dobot_async.transports.ble import scan as ble_scan
 from dobot_async.transports.ble import transport as ble
 
@@ -102,8 +103,8 @@ async def module(world: Rig, sim: Simulation) -> Module:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """What waits for an arm that is not there waits less."""
-    monkeypatch.setattr(ble, "SCAN", 0.3)
-    monkeypatch.setattr(ble, "PAUSES", (0.01, 0.01))
+    monkeypatch.setattr(opening, "SCAN", 0.3)
+    monkeypatch.setattr(opening, "PAUSES", (0.01, 0.01))
 
 
 def fast(**details: Any) -> Radio:

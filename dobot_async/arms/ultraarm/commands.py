@@ -21,6 +21,7 @@ from dobot_async._core.protocol.rows import Rows
 from dobot_async._core.protocol.wire import Command, Layout, Queueing
 from dobot_async.arms.ultraarm.answers import RECEIPT, STATUS, Bracket, Numbers, Receipt
 from dobot_async.arms.ultraarm.layouts import Relative, Whole, Words
+from dobot_async.arms.ultraarm.limits import *
 from dobot_async.arms.ultraarm.params import *
 
 Q = TypeVar("Q")
