@@ -25,6 +25,7 @@ from dobot_async._core.protocol.wire import (
     Queueing,
     Record,
     Scalar,
+    commands_in,
     f32,
     flag,
     u8,
@@ -231,5 +232,5 @@ GET_QUEUED_CMD_LEFT_SPACE = read("GetQueuedCmdLeftSpace", 247, Count(), "2.19.8"
 GET_QUEUED_CMD_MOTION_FINISH = read("GetQueuedCmdMotionFinish", 248, FLAG, "V1.1.5")
 
 # The order of the module is the order of the table.
-ALL: tuple[Command[Any, Any], ...] = tuple(row for row in tuple(globals().values()) if isinstance(row, Command))
+ALL = commands_in(globals())
 BY_KEY: Mapping[tuple[int, bool], Command[Any, Any]] = MappingProxyType({(row.id, row.write): row for row in ALL})

@@ -18,7 +18,7 @@ from typing import Annotated, Any
 
 from dobot_async._core.protocol.layouts import NOTHING
 from dobot_async._core.protocol.rows import Rows
-from dobot_async._core.protocol.wire import Command, Queueing
+from dobot_async._core.protocol.wire import Command, Queueing, commands_in
 from dobot_async.arms.mycobot.dialects import PositionLayout, ServoRegister
 from dobot_async.arms.mycobot.layouts import ACK, Axis, Fixed, Octets, Packed, Value, Whole
 from dobot_async.arms.mycobot.params import *
@@ -170,7 +170,7 @@ SET_TRANSPONDER_MODE = write("SetTransponderMode", 0xB1, TRANSPONDER_MODE, "Sett
 GET_BASIC_VERSION = read("GetBasicVersion", 0xC1, VERSION, "later")
 
 # The order of the module is the order of the table.
-ALL: tuple[Command[Any, Any], ...] = tuple(row for row in tuple(globals().values()) if isinstance(row, Command))
+ALL = commands_in(globals())
 
 CONFIRMED_BY: Mapping[Command[Any, Any], Command[Any, Any]] = MappingProxyType(
     {

@@ -12,13 +12,13 @@ disagree.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 from dobot_async._core.protocol.layouts import NOTHING
 from dobot_async._core.protocol.rows import Rows
-from dobot_async._core.protocol.wire import Command, Layout, Queueing
+from dobot_async._core.protocol.wire import Command, Layout, Queueing, commands_in
 from dobot_async.arms.ultraarm.answers import RECEIPT, STATUS, Bracket, Numbers, Receipt
 from dobot_async.arms.ultraarm.layouts import Relative, Whole, Words
 from dobot_async.arms.ultraarm.limits import *
@@ -59,7 +59,11 @@ def motion(word: str, request: type[Q] | Layout[Q], section: str) -> Command[Q, 
 
 def plain(convert: type[R]) -> tuple[Any, Any]:
     """How one number in brackets is read and written."""
-    return (lambda texts: convert(*texts)), str
+
+    def read(texts: Sequence[str]) -> R:
+        return convert(*texts)
+
+    return read, str
 
 
 NEVER = Queueing.NEVER
@@ -108,5 +112,5 @@ GET_ENDSTOPS = read("M119", Numbers("ENDSTOP", Endstops, int), "get the status o
 GET_QUEUE_SIZE = read("M120", RECEIPT, "pymycobot")
 
 # The order of the module is the order of the table.
-ALL: tuple[Command[Any, Any], ...] = tuple(row for row in tuple(globals().values()) if isinstance(row, Command))
+ALL = commands_in(globals())
 BY_WORD: Mapping[str, Command[Any, Any]] = MappingProxyType({row.name: row for row in ALL if row is not MOVE_BY})
