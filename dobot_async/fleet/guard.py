@@ -233,23 +233,22 @@ class Guard(Generic[S]):
     async def catch_up(self) -> None:
         """Take note of all that is known to have ended: what it held may be what is asked for next."""
         self._doubt()
-        with suppress(DobotError):
+        try:
             while self._steps and self._steps[0].motion.ended:
-                step = self._steps[0]
-                if step.motion.exception():
-                    await self.lost()
+                if self._steps[0].motion.exception():
+                    self._forget()
                 else:
-                    await self.done(step)
+                    self._done(self._steps.popleft())
 
             if not (self._located or self._busy or (self._mute and self._party.failure)):
                 await self.locate()
+        except DobotError:
+            pass  # it does not tell; it keeps what it holds until somebody asks again
+        finally:
+            self._settle()
 
-    async def done(self, step: Step) -> None:
-        """Take note that a step is done."""
-        if step not in self._steps:
-            return
-
-        self._steps.remove(step)
+    def _done(self, step: Step) -> None:
+        """Take note that the first step is done."""
         if step.homing is not None:
             self._planner.homed(step.homing)
 
@@ -259,21 +258,10 @@ class Guard(Generic[S]):
             self._standing |= step.zones
             self._located = False
 
-        if not (self._located or self._busy):
-            await self.locate()
-
-        self._settle()
-
     def unsure(self) -> None:
         """Take note that the arm is stopped, somewhere on its way."""
         self._located, self._stance = False, None
         self._plans += 1
-
-    async def lost(self) -> None:
-        """Take note that the first step has failed: the arm may be anywhere on the way of those that have."""
-        self._forget()
-        if not self._busy:
-            await self.locate()
 
     async def locate(self) -> None:
         """Find out where the arm stands once it does; raise DobotError if it does not tell."""
@@ -284,23 +272,11 @@ class Guard(Generic[S]):
             await self._queue.stops_heard()
             await self._rest()
             stance = await self._planner.look()
+            self._mute = False
+            if plans == self._plans and not self._loose:
+                self._stands(stance)
         finally:
             self._looking -= 1
-
-        self._mute = False
-        if plans == self._plans and not self._loose:
-            self._planner.settled(stance)
-            self._located = True
-            if self._planner.astray:
-                self._stance = None
-                self._standing |= self._anywhere()
-                self._inside &= self.holds  # another one may be where it was looked at last
-            else:
-                region, self._stance = stance.region, stance
-                self._standing = self._zones_of(region)
-                inside = region.zones(self._zones, self._base, ROUNDING)
-                self._inside = inside if region.known else frozenset()
-
             self._settle()
 
     async def watch_limits(self) -> str:
@@ -373,6 +349,20 @@ class Guard(Generic[S]):
                 return
 
             before = now
+
+    def _stands(self, stance: S) -> None:
+        """Take note of where the arm stands, with nothing to do."""
+        self._planner.settled(stance)
+        self._located = True
+        if self._planner.astray:
+            self._stance = None
+            self._standing |= self._anywhere()
+            self._inside &= self.holds  # another one may be where it was looked at last
+        else:
+            region, self._stance = stance.region, stance
+            self._standing = self._zones_of(region)
+            inside = region.zones(self._zones, self._base, ROUNDING)
+            self._inside = inside if region.known else frozenset()
 
     def _forget(self) -> None:
         """Drop steps that have failed; the arm may be anywhere on their way."""
