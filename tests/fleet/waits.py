@@ -15,7 +15,7 @@ from typing import Any
 
 from dobot_async.fleet.claims import Claim, Claims, Party, Pause
 
-__all__ = ["Scene", "end", "watch"]
+__all__ = ["Scene", "Wait", "end", "named", "watch"]
 
 Wait = Claim | Pause
 TICK = 0.01  # virtual seconds between two looks
