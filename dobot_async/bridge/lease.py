@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Generic, Literal, TypeVar
 
+from dobot_async._core.protocol.contract import Frame
+from dobot_async.arms.bridge_adapter import Bridged
 from dobot_async.bridge.client import Client
 from dobot_async.bridge.desk import Refused
 from dobot_async.bridge.line import Line
-from dobot_async.bridged import Bridged
-from dobot_async.contract import Frame
 from dobot_async.errors import ConnectionLost, DobotError
 
 __all__ = ["Lease"]

@@ -32,13 +32,14 @@ from typing import Any, NoReturn, cast
 from urllib.parse import urlsplit
 
 from dobot_async._core.util.shapes import Box, Cylinder, Shape
+from dobot_async._core.util.urls import hidden
+from dobot_async.arms.registry import families
 from dobot_async.arms.session import check_options
-from dobot_async.families import families
 from dobot_async.fleet.families import FAMILIES, AnyArm
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.seat import Member
 from dobot_async.program.text import read_text, shortened
-from dobot_async.transports import SCHEMES, hidden
+from dobot_async.transports import SCHEMES
 
 __all__ = ["Cell", "parse_cell", "read_cell"]
 

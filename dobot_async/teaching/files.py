@@ -44,7 +44,7 @@ def to_json(recording: Recording) -> str:
 
 def given(value: Any, without: Collection[str] = ()) -> dict[str, Any]:
     """What differs from what it is by default."""
-    found = {}
+    found: dict[str, Any] = {}
     for each in fields(value):
         here = getattr(value, each.name)
         if each.name not in without and (each.default is MISSING or here != each.default):

@@ -13,10 +13,10 @@ from typing import Any, SupportsFloat, SupportsIndex
 
 from dobot_async._core.util.arguments import to_float
 from dobot_async.arms.base import Arm
-from dobot_async.teaching.arms import check_recording, taught
 from dobot_async.teaching.base import TaughtArm
 from dobot_async.teaching.problems import RecordingUnfit
 from dobot_async.teaching.recording import Recording
+from dobot_async.teaching.registry import check_recording, taught
 
 __all__ = ["play"]
 

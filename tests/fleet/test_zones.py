@@ -11,10 +11,10 @@ import pytest
 from virtual import virtual
 
 from dobot_async import ArmAlarm, DobotError, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
+from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Cylinder, Member, ZoneDeadlock, ZoneOccupied
 from dobot_async.fleet.claims import Claim, Party
 from dobot_async.fleet.zones import Zones
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 # Two arms that face each other; the bin lies in the middle between them, and each has a tray at its side.
@@ -594,6 +594,7 @@ def test_members_are_checked() -> None:
 async def test_an_arm_that_does_not_tell_where_it_stands_is_waited_for_no_more() -> None:
     async with facing() as (fleet, sims):
         told: list[DobotError] = []
+        ended = asyncio.Event()
 
         async def left() -> None:
             with suppress(TimeoutError):
@@ -605,6 +606,7 @@ async def test_an_arm_that_does_not_tell_where_it_stands_is_waited_for_no_more()
                     pass
             except DobotError as error:
                 told.append(error)
+                ended.set()
 
         async def right() -> None:
             async with fleet.zone("belt"):
@@ -615,6 +617,7 @@ async def test_an_arm_that_does_not_tell_where_it_stands_is_waited_for_no_more()
                         pass
                 except DobotError as error:
                     told.append(error)
+                    ended.set()
 
         async def other() -> None:
             """Has the arm looked at when the last claim is judged, and for longer than that takes."""
@@ -622,8 +625,7 @@ async def test_an_arm_that_does_not_tell_where_it_stands_is_waited_for_no_more()
             with suppress(DobotError):
                 await fleet["left"].move_to(*BEHIND)
 
-            while not told:  # the end of a program has all claims judged
-                await asyncio.sleep(1)
+            await ended.wait()  # for the end of a program has all claims judged
 
         async with asyncio.timeout(60):
             await fleet.run({"left": left(), "right": right(), "other": other()})

@@ -24,11 +24,12 @@ import anyio
 import pytest
 
 from dobot_async import ConnectFailed, ConnectionLost, Magician, MotionUnknown, PTPMode, SuctionCup
-from dobot_async.contract import LinkState
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame, Parser, encode
+from dobot_async._core.protocol.contract import LinkState
+from dobot_async._core.protocol.transport import Transport
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame, Parser, encode
 from dobot_async.simulator import Simulation, simulate
-from dobot_async.transports import Transport, open_transport
+from dobot_async.transports import open_transport
 
 if sys.platform != "linux":
     pytest.skip("BlueZ is Linux's", allow_module_level=True)
@@ -49,12 +50,15 @@ from dbus_fast import Message
 from dbus_fast.aio import MessageBus
 
 from dobot_async._core.util.tasks import Ended, run_shielded, run_within
-from dobot_async.simulator import bluez
-from dobot_async.simulator.ble_module import Module
-from dobot_async.simulator.ble_names import ADAPTER
-from dobot_async.simulator.ble_rig import Rig, rig
-from dobot_async.simulator.radio import Radio, round_trip
-from dobot_async.transports import ble, ble_advice, ble_claim, ble_scan
+from dobot_async.simulator.ble import bluez
+from dobot_async.simulator.ble.link_layer import Radio, round_trip
+from dobot_async.simulator.ble.module import Module
+from dobot_async.simulator.ble.names import ADAPTER
+from dobot_async.simulator.ble.testbed import Rig, rig
+from dobot_async.transports.ble import diagnostics as ble_advice
+from dobot_async.transports.ble import lock as ble_claim
+from dobot_async.transports.ble import scan as ble_scan
+from dobot_async.transports.ble import transport as ble
 
 DAEMON = shutil.which("dbus-daemon")
 if not DAEMON and not os.environ.get("DOBOT_REQUIRE_DBUS"):
