@@ -240,10 +240,10 @@ class Guard(Generic[S]):
                 else:
                     self._done(self._steps.popleft())
 
-            if not (self._located or self._busy or (self._mute and self._party.failure)):
+            if self.is_sought:
                 await self.locate()
         except DobotError:
-            pass  # it does not tell; it keeps what it holds until somebody asks again
+            pass  # it does not tell, and keeps what it holds until it does
         finally:
             self._settle()
 
@@ -278,6 +278,11 @@ class Guard(Generic[S]):
         finally:
             self._looking -= 1
             self._settle()
+
+    @property
+    def is_sought(self) -> bool:
+        """Whether the arm has nothing to do, and it is not known where it stands. Of one that has failed is asked once."""
+        return not (self._located or self._busy or (self._mute and self._party.failure))
 
     async def watch_limits(self) -> str:
         """Return why a jog has to end: the tool is about to leave the limits."""

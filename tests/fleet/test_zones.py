@@ -632,3 +632,39 @@ async def test_an_arm_that_does_not_tell_where_it_stands_is_waited_for_no_more()
 
         assert isinstance(told[0], ZoneDeadlock)
         sims["left"].faults.loss = 0.0
+
+
+@virtual
+async def test_who_has_had_its_turn_is_not_waited_for_any_more() -> None:
+    async with facing() as (fleet, sims):
+
+        async def program() -> None:
+            await fleet["left"].queue.move_to(*ASIDE)
+            await fleet.barrier("meet")
+
+        await fleet.run({"left": program(), "other": program()})
+        await fleet["left"].queue.join()
+        assert moved(sims["left"]) == 2
+
+
+@virtual
+async def test_an_arm_that_did_not_tell_where_it_stands_is_asked_until_it_does() -> None:
+    async with facing() as (fleet, sims):
+        loop = asyncio.get_running_loop()
+
+        async def left() -> None:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(0.2):
+                    await fleet["left"].move_to(*ASIDE)  # through the bin, which its arm leaves while nobody hears it
+
+            await asyncio.sleep(60)
+
+        async def right() -> float:
+            await asyncio.sleep(0.1)
+            sims["left"].faults.loss = 1.0
+            async with fleet.zone("bin"):
+                return loop.time()
+
+        loop.call_later(20, setattr, sims["left"].faults, "loss", 0.0)
+        told = await fleet.run({"left": left(), "right": right()})
+        assert 20 < told["right"] < 30
