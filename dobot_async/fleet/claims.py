@@ -9,7 +9,8 @@ No I/O and no clock: each claim is told its answer by a call.
 A claim is for one or several zones, all of which it gets at once. Claims on the same zone are granted in the order of
 their requests. There is one exception: a claim passes an earlier one that waits, directly or not, for the party that
 asks, for that one would otherwise wait for itself. A cycle of waits that is left is a deadlock, and who closes it is
-told so. An arm that still moves may yet leave a zone by itself; whether it does shows when it stands.
+told so. An arm that still moves may yet leave a zone by itself; whether it does shows when it stands. So all claims are
+judged anew when an arm comes to rest, as when something is released, also if it does not tell where it stands.
 """
 
 from __future__ import annotations
@@ -184,7 +185,7 @@ class Claims:
         self._end(lambda _: True, error)
 
     def settle(self) -> None:
-        """Answers all that can be answered; to be called when a party has failed."""
+        """Answers all that can be answered; to be called when a party has failed or come to rest."""
         while True:
             found = next((claim for claim in self._waiting if self._free(claim) and self._next(claim)), None)
             if found:

@@ -11,6 +11,8 @@
    hand.
 5. An arm that was switched off and on does not know where it is: it may be anywhere in its reach, and each of its ways
    may lead anywhere there, until it was homed.
+6. Whatever ends, a step, a jog or a look, all claims are judged anew: an arm that does not tell where it stands keeps
+   what it holds, and yet it rests. It is asked again until it tells.
 
 What is looked at is the tool's place; `clearance` is for what is around it.
 """

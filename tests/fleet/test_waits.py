@@ -12,11 +12,13 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import permutations
-from typing import TypeVar
+from random import Random
+from typing import Any, TypeVar
 
+import pytest
 from hypothesis import Phase, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 from waits import Scene, Wait, named
 
 from dobot_async import DobotError, MotionStopped
@@ -28,14 +30,13 @@ ARMS = "abcd"
 TASKS = {"e": "a", "f": "a", "g": "e"}
 """Who was started by whom."""
 
-ways = st.frozensets(st.sampled_from(ZONES), min_size=1)
+PLACES = ["", "", *ZONES, "AB"]
+WAYS = [*ZONES, *ZONES, "AB", "BC", "ABC"]
+MOMENTS = 300
+
 T = TypeVar("T")
 Then = Callable[[], None]
-
-
-def pick(data: st.DataObject, of: Sequence[T]) -> T:
-    """One of several."""
-    return data.draw(st.sampled_from(of))
+Pick = Callable[[Sequence[Any]], Any]
 
 
 @dataclass(eq=False, repr=False)
@@ -70,6 +71,8 @@ class Arm:
     """An arm.
 
     Attributes:
+        moves: Whether it does.
+        jogged: Whether it does so for the length of a block of whoever has the turn.
         driver: Who has moved it last.
         turn: Whose turn it is to command it, from the moment on at which that is settled.
         commanding: The same, from the moment on at which that one goes on.
@@ -96,6 +99,7 @@ class Cell(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
+        self.pick: Pick = Random(0).choice
         self.claims = Claims()
         self.arms = {name: Arm(name) for name in ARMS}
         self.doers = {name: Doer(name) for name in ARMS}
@@ -107,6 +111,17 @@ class Cell(RuleBasedStateMachine):
         self.pauses: list[Pause] = []
         self.come: list[Doer] = []
         self.ending: DobotError | None = None
+
+    @initialize(data=st.data())
+    def begin(self, data: st.DataObject) -> None:
+        self.pick = lambda of: data.draw(st.sampled_from(of))
+
+    @rule()
+    def something(self) -> None:
+        """What one of those does who can do something."""
+        able = {what: whom for what, (_, who) in ACTIONS.items() if (whom := who(self))}
+        what = self.pick([what for what in able for _ in range(ACTIONS[what][0])])
+        what(self, self.pick(able[what]))
 
     @invariant()
     def nobody_is_left_to_wait(self) -> None:
@@ -124,18 +139,14 @@ class Cell(RuleBasedStateMachine):
 
     # What programs do.
 
-    @precondition(lambda self: self.ready())
-    @rule(data=st.data(), way=ways, patient=st.integers(0, 4))
-    def command(self, data: st.DataObject, way: frozenset[str], patient: int) -> None:
+    def command(self, doer: Doer) -> None:
         """A program moves an arm, mostly its own."""
-        doer = pick(data, self.ready())
-        names = doer.name * 6 + ARMS if doer.name in ARMS else ARMS
-        arm = self.arms[pick(data, names)]
+        arm = self.arms[self.pick(doer.name * 6 + ARMS if doer.name in ARMS else ARMS)]
         if not arm.party.failure:
-            jogs = pick(data, [False, False, False, False, True])
-            self.take_turn(doer, arm, partial(self.go, doer, arm, way, patient=patient > 0, jogs=jogs))
+            go = partial(self.go, doer, arm, jogs=self.pick([False] * 4 + [True]))
+            self.take_turn(doer, arm, go)
 
-    def go(self, doer: Doer, arm: Arm, way: frozenset[str], *, patient: bool, jogs: bool) -> None:
+    def go(self, doer: Doer, arm: Arm, *, jogs: bool) -> None:
         """It has the arm's turn, and asks for the way; it keeps the turn as long as it jogs."""
 
         def granted() -> None:
@@ -146,41 +157,34 @@ class Cell(RuleBasedStateMachine):
         claim = Claim(
             arm.party,
             doer.line() | {arm.party},
-            way,
-            patient=patient,
+            frozenset(self.pick(WAYS)),
+            patient=self.pick([True] * 4 + [False]),
             stuck=self.driven(doer),
             asker=doer.party,
             parked=partial(self.parked, doer),
         )
         self.ask(doer, claim, granted)
 
-    @rule(data=st.data())
-    def end_jog(self, data: st.DataObject) -> None:
+    def end_jog(self, arm: Arm) -> None:
         """A program jogs no longer."""
-        jogged = [arm for arm in self.arms.values() if arm.jogged and arm.turn in self.ready()]
-        if jogged:
-            arm = pick(data, jogged)
-            arm.jogged = False
-            self.end_turn(arm)
+        arm.jogged = False
+        self.end_turn(arm)
 
-    @precondition(lambda self: self.ready())
-    @rule(data=st.data())
-    def start_together(self, data: st.DataObject) -> None:
+    def start_together(self, doer: Doer) -> None:
         """A program starts two arms at one instant, each with a way of its own."""
-        doer = pick(data, self.ready())
         free = [arm for arm in self.arms.values() if not (arm.turn or arm.behind or arm.party.failure)]
         if len(free) < 2:
             return
 
-        arms = [free[0], pick(data, free[1:])]
-        ways = dict(zip(pick(data, list(permutations(ZONES, 2))), arms, strict=True))
+        arms = [free[0], self.pick(free[1:])]
+        ways = dict(zip(self.pick(list(permutations(ZONES, 2))), arms, strict=True))
         for arm in arms:
             arm.turn, arm.commanding, arm.driver = doer, (doer.party,), doer
 
         def granted() -> None:
             for zone, arm in ways.items():
                 arm.moves = True
-                self.take(arm, frozenset(zone))
+                self.take(arm, zone)
 
             self.give_back(claim)
 
@@ -196,42 +200,24 @@ class Cell(RuleBasedStateMachine):
         )
         self.ask(doer, claim, granted)
 
-    @precondition(lambda self: self.ready())
-    @rule(data=st.data(), zones=ways)
-    def hold(self, data: st.DataObject, zones: frozenset[str]) -> None:
+    def hold(self, doer: Doer) -> None:
         """A program asks for zones for itself."""
-        doer = pick(data, self.ready())
         its = frozenset([self.arms[doer.name].party] if doer.name in ARMS else [])
         own = doer.line() | its | self.driven(doer)
+        zones = frozenset(self.pick(WAYS))
         self.ask(doer, Claim(doer.party, own, zones, parked=partial(self.parked, doer)), lambda: None)
 
-    @rule(data=st.data())
-    def leave(self, data: st.DataObject) -> None:
-        """A program leaves a zone."""
-        parties = [doer.party for doer in self.ready()]
-        held = [claim for claim in self.holds if claim.party in parties]
-        if held:
-            self.give_back(pick(data, held))
-
-    @precondition(lambda self: all(self.doers[name].alive for name in ARMS))
-    @rule(data=st.data())
-    def meet(self, data: st.DataObject) -> None:
+    def meet(self, doer: Doer) -> None:
         """A program comes to the barrier of all."""
-        ready = [doer for doer in self.ready() if doer.name in ARMS]
-        if ready:
-            doer = pick(data, ready)
-            self.come.append(doer)
-            if len(self.come) == len(ARMS):
-                self.come.pop()
-                self.open()
-            elif not self.pause(doer, "at the barrier for", partial(self.absent, doer)):
-                self.come.remove(doer)
+        self.come.append(doer)
+        if len(self.come) == len(ARMS):
+            self.come.pop()
+            self.open()
+        elif not self.pause(doer, "at the barrier for", partial(self.absent, doer)):
+            self.come.remove(doer)
 
-    @precondition(lambda self: self.in_doubt())
-    @rule(data=st.data())
-    def give_up(self, data: st.DataObject) -> None:
+    def give_up(self, doer: Doer) -> None:
         """A program waits no longer."""
-        doer = pick(data, self.in_doubt())
         if isinstance(doer.wait, Claim):
             claim, doer.wait = doer.wait, None
             self.waiting.remove(claim)
@@ -248,20 +234,16 @@ class Cell(RuleBasedStateMachine):
         doer.then = None
         self.wake(doer)
 
-    @rule(data=st.data())
-    def disturb(self, data: st.DataObject) -> None:
-        """What is not for every day."""
-        arm = pick(data, list(self.arms.values()))
-        pick(data, [self.end, self.look, self.look, self.turn_up, self.fail, self.stop, self.stop_all])(arm, data)
-
-    def end(self, _: Arm, data: st.DataObject) -> None:
-        """A program ends, for which its tasks have ended before; nobody waits for it at a barrier any more."""
-        ready = self.ready()
-        doer = pick(data, ready or list(self.doers.values()))
-        if len(ready) < 3 or any(each.alive and each.parent is doer for each in self.doers.values()):
+    def end(self, doer: Doer) -> None:
+        """A program ends, and so do its tasks; nobody waits for it at a barrier any more. Or another one begins."""
+        if not doer.alive:
+            doer.alive = doer.parent is None or doer.parent.alive
             return
 
-        for claim in [claim for claim in self.holds if claim.party is doer.party]:
+        if any(each.alive and each.parent is doer for each in self.doers.values()):
+            return
+
+        for claim in self.held_by(doer.party):
             self.give_back(claim)
 
         for arm in self.arms.values():
@@ -274,24 +256,18 @@ class Cell(RuleBasedStateMachine):
 
         self.claims.settle()
 
-    @precondition(lambda self: any(doer.then for doer in self.doers.values()))
-    @rule(data=st.data())
-    def go_on(self, data: st.DataObject) -> None:
+    def go_on(self, doer: Doer) -> None:
         """A program goes on that was answered."""
-        doer = pick(data, [doer for doer in self.doers.values() if doer.then])
         then, doer.then = doer.then, None
         assert then
         then()
 
     # What arms do.
 
-    @precondition(lambda self: any(arm.moves for arm in self.arms.values()))
-    @rule(data=st.data(), tells=st.booleans())
-    def rest(self, data: st.DataObject, tells: bool) -> None:
+    def rest(self, arm: Arm) -> None:
         """An arm comes to rest, somewhere where it was let, or it does not tell where."""
-        arm = pick(data, [arm for arm in self.arms.values() if arm.moves])
-        held = [claim for claim in self.holds if claim.party is arm.party]
-        stays = frozenset(pick(data, ["", "", *ZONES, "AB"]) if tells else ZONES)
+        held = self.held_by(arm.party)
+        stays = frozenset(self.pick([*PLACES, ZONES, ZONES]))
         arm.moves = False
         for claim in held:
             self.holds[claim] &= stays
@@ -300,28 +276,34 @@ class Cell(RuleBasedStateMachine):
 
         self.claims.keep(held, stays)
 
-    def look(self, arm: Arm, _: st.DataObject) -> None:
+    def look(self, arm: Arm) -> None:
         """An arm that stands may yet turn out to be elsewhere."""
         arm.moves = True
 
-    def turn_up(self, arm: Arm, data: st.DataObject) -> None:
+    def turn_up(self, arm: Arm) -> None:
         """An arm is where it was not known to be."""
-        self.take(arm, frozenset(pick(data, [*ZONES, "BC"])))
+        self.take(arm, self.pick(WAYS))
 
-    def fail(self, arm: Arm, _: st.DataObject) -> None:
-        """An arm fails, or works again."""
-        if arm.party.failure:
-            arm.party.failure = None
-        else:
-            arm.party.failure = self.ending = MotionStopped("it failed")
-            self.claims.fail([arm.party], self.ending)
+    def fail(self, arm: Arm) -> None:
+        """An arm fails."""
+        arm.party.failure = self.ending = MotionStopped("it failed")
+        self.claims.fail([arm.party], self.ending)
 
-    def stop(self, arm: Arm, _: st.DataObject) -> None:
+    def recover(self, arm: Arm) -> None:
+        """An arm works again, and stands in no zone."""
+        arm.party.failure, arm.moves = None, False
+        held = self.held_by(arm.party)
+        for claim in held:
+            del self.holds[claim]
+
+        self.claims.keep(held, frozenset())
+
+    def stop(self, arm: Arm) -> None:
         """An arm is stopped."""
         self.ending = MotionStopped("a stop")
         self.claims.interrupt(arm.party, self.ending)
 
-    def stop_all(self, _: Arm, __: st.DataObject) -> None:
+    def stop_all(self, _: Arm) -> None:
         """All are stopped."""
         self.ending = MotionStopped("a stop of all")
         self.claims.stop(self.ending)
@@ -335,6 +317,9 @@ class Cell(RuleBasedStateMachine):
 
     def ready(self) -> list[Doer]:
         return [doer for doer in self.doers.values() if doer.alive and not doer.wait and not doer.then]
+
+    def held_by(self, *parties: Party) -> list[Claim]:
+        return [claim for claim in self.holds if claim.party in parties]
 
     def in_doubt(self) -> list[Doer]:
         return [doer for doer in self.doers.values() if doer.wait and not doer.then]
@@ -414,9 +399,9 @@ class Cell(RuleBasedStateMachine):
         self.pauses.remove(pause)
         doer.paused.__exit__(None, None, None)
 
-    def take(self, arm: Arm, zones: frozenset[str]) -> None:
-        claim = Claim(arm.party, frozenset([arm.party]), zones)
-        self.holds[claim] = zones
+    def take(self, arm: Arm, zones: str) -> None:
+        claim = Claim(arm.party, frozenset([arm.party]), frozenset(zones))
+        self.holds[claim] = claim.zones
         self.claims.take(claim)
 
     def give_back(self, claim: Claim) -> None:
@@ -437,6 +422,7 @@ class Cell(RuleBasedStateMachine):
             granted()
             self.pass_on(doer)
 
+        assert doer.line() | self.driven(doer) <= claim.stuck
         claim.answer = answer
         doer.wait = claim
         self.waiting.append(claim)
@@ -457,6 +443,48 @@ class Cell(RuleBasedStateMachine):
             assert not scene.is_due(claim)
 
 
+def ready_to_meet(cell: Cell) -> list[Doer]:
+    """Those who may come to the barrier of all."""
+    together = all(cell.doers[name].alive for name in ARMS)
+    return [doer for doer in cell.ready() if together and doer.name in ARMS]
+
+
+def all_arms(cell: Cell) -> list[Arm]:
+    return list(cell.arms.values())
+
+
+ACTIONS: dict[Callable[[Cell, Any], None], tuple[int, Callable[[Cell], Sequence[Any]]]] = {
+    Cell.command: (8, Cell.ready),
+    Cell.hold: (4, Cell.ready),
+    Cell.start_together: (2, Cell.ready),
+    Cell.meet: (3, ready_to_meet),
+    Cell.end: (1, lambda cell: [doer for doer in cell.doers.values() if not doer.wait and not doer.then]),
+    Cell.give_up: (2, Cell.in_doubt),
+    Cell.go_on: (20, lambda cell: [doer for doer in cell.doers.values() if doer.then]),
+    Cell.give_back: (6, lambda cell: cell.held_by(*(doer.party for doer in cell.ready()))),
+    Cell.end_jog: (2, lambda cell: [arm for arm in all_arms(cell) if arm.jogged and arm.turn in cell.ready()]),
+    Cell.rest: (8, lambda cell: [arm for arm in all_arms(cell) if arm.moves]),
+    Cell.look: (1, all_arms),
+    Cell.turn_up: (1, all_arms),
+    Cell.fail: (1, lambda cell: [arm for arm in all_arms(cell) if not arm.party.failure]),
+    Cell.recover: (10, lambda cell: [arm for arm in all_arms(cell) if arm.party.failure]),
+    Cell.stop: (1, all_arms),
+    Cell.stop_all: (1, all_arms),
+}
+"""How often something is done, and by whom."""
+
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink)
-Cell.TestCase.settings = settings(max_examples=200, stateful_step_count=60, deadline=None, phases=PHASES)
+Cell.TestCase.settings = settings(max_examples=40, stateful_step_count=50, deadline=None, phases=PHASES)
 test_any_cell = Cell.TestCase
+
+
+@pytest.mark.parametrize("first", range(0, 40, 10))
+def test_cells_that_go_on_for_long(first: int) -> None:
+    for seed in range(first, first + 10):
+        cell = Cell()
+        cell.pick = Random(seed).choice
+        for _ in range(MOMENTS):
+            cell.something()
+            cell.nobody_is_left_to_wait()
+            cell.zones_are_held_by_whom_they_were_given()
+            cell.who_waits_is_known_to_wait()

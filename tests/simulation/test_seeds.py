@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from scenario import run_seed
-from soak import replay
+from soak import replay, scenario
 
 SEEDS = 60
 BLOCK = 10
@@ -30,6 +30,11 @@ HARD = {
 }
 """What once broke a promise, each found in the scenario as it is now."""
 
+HARD_CELLS = {
+    900895: "an arm that comes to rest and does not tell where, while all wait and nothing else happens",
+}
+"""The same of the scenario of a cell."""
+
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
 @pytest.mark.parametrize("first", range(0, SEEDS, BLOCK))
@@ -46,6 +51,12 @@ def test_seeds(first: int) -> None:
 @pytest.mark.parametrize("seed", HARD, ids=HARD.get)
 def test_seeds_that_once_broke_a_promise(seed: int) -> None:
     run_seed(seed)
+
+
+@pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
+@pytest.mark.parametrize("seed", HARD_CELLS, ids=HARD_CELLS.get)
+def test_cells_that_once_broke_a_promise(seed: int) -> None:
+    scenario("cell").run_seed(seed)
 
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
