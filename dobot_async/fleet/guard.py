@@ -283,7 +283,7 @@ class Guard(Generic[S]):
 
     @property
     def is_sought(self) -> bool:
-        """Whether the arm has nothing to do, and it is not known where it stands. Of one that has failed is asked once."""
+        """Whether the arm rests somewhere that it is still to be asked about. One that has failed is asked once."""
         return not (self._located or self._busy or (self._mute and self._party.failure))
 
     async def watch_limits(self) -> str:
