@@ -34,11 +34,13 @@ class Party:
     Attributes:
         name: For messages.
         failure: Why it will not leave what it holds; None while all is well.
+        inside: The zones that it is known to be in, whoever else holds them: it may go on in them.
         moving: Tells whether it may leave what it holds without being told to.
     """
 
     name: str
     failure: DobotError | None = None
+    inside: frozenset[str] = frozenset()
     moving: Callable[[], bool] = field(default=lambda: False)
 
 
@@ -213,11 +215,13 @@ class Claims:
         self.settle()
 
     def _foreign(self, claim: Claim) -> Iterator[tuple[Party, str]]:
-        """Who stands in the way of a claim, and in which zone; who is in a zone may move in it, even beside others."""
-        inside = frozenset[str]().union(*(each.zones for each in self._held if each.party is claim.party))
+        """Who stands in the way of a claim, and in which zone; who is in a zone may move in it, even beside others.
+
+        To hold it is not enough: who only may be in a zone, beside another one who only may be there, could meet it.
+        """
         for each in self._held:
             if each.party not in claim.own:
-                for zone in sorted(each.zones & claim.zones - inside):
+                for zone in sorted(each.zones & claim.zones - claim.party.inside):
                     yield each.party, zone
 
     def _free(self, claim: Claim) -> bool:

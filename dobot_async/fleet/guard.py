@@ -91,7 +91,6 @@ class Guard(Generic[S]):
         self._claims: list[Claim] = []
         self._stance: S | None = None  # after all steps
         self._standing: frozenset[str] = frozenset()
-        self._inside: frozenset[str] = frozenset()  # those of them that it was really in when it was looked at last
         self._located = False
         self._loose: list[frozenset[str]] = []  # where the arm may be by what is no step: jogs, leftovers, changes
         self._mute = False  # whether it did not tell where it is when it was asked last
@@ -145,6 +144,8 @@ class Guard(Generic[S]):
         self._steps.extend(course.steps)
         for step in course.steps:
             step.homing = self._planner.begun(step.motion.entry.value)
+            if step.motion.moves:
+                self._party.inside &= step.after or frozenset()
 
         if course.moves:
             self._plans += 1
@@ -364,12 +365,12 @@ class Guard(Generic[S]):
         if self._planner.astray:
             self._stance = None
             self._standing |= self._anywhere()
-            self._inside &= self.holds  # another one may be where it was looked at last
+            self._party.inside &= self.holds  # another one may be where it was looked at last
         else:
             region, self._stance = stance.region, stance
             self._standing = self._zones_of(region)
             inside = region.zones(self._zones, self._base, ROUNDING)
-            self._inside = inside if region.known else frozenset()
+            self._party.inside = inside if region.known else frozenset()
 
     def _forget(self) -> None:
         """Drop steps that have failed; the arm may be anywhere on their way."""
@@ -392,7 +393,7 @@ class Guard(Generic[S]):
         ahead = frozenset[str]().union(*self._loose, *(step.zones for step in self._steps))
         others = (claim.zones for claim in self._zones.claims.held if claim.party is not self._party)
         needed = ahead | self._standing
-        missing = (ahead | self._inside & self._standing | self._standing.difference(*others)) - self.holds
+        missing = (ahead | self._party.inside & self._standing | self._standing.difference(*others)) - self.holds
         if missing:
             claim = Claim(self._party, frozenset([self._party]), missing)
             self._claims.append(claim)

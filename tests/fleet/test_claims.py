@@ -97,13 +97,21 @@ def test_a_holder_that_has_failed_is_not_waited_for() -> None:
         assert "an alarm" in str(claim.told[0])
 
 
-def test_who_is_in_a_zone_beside_another_may_move_out() -> None:
-    claims = Claims()
-    for party in (LEFT, RIGHT):
+def test_who_only_may_be_in_a_zone_beside_another_waits() -> None:
+    claims, left = Claims(), Party("left")
+    for party in (left, RIGHT):
         claims.take(Claim(party, frozenset([party]), frozenset("A")))
 
-    assert claims.holders("A") == [LEFT, RIGHT]
-    assert ask(claims, LEFT, "AB").granted
+    assert not ask(claims, left, "A").told
+
+
+def test_who_is_in_a_zone_beside_another_may_move_out() -> None:
+    claims, left = Claims(), Party("left", inside=frozenset("A"))
+    for party in (left, RIGHT):
+        claims.take(Claim(party, frozenset([party]), frozenset("A")))
+
+    assert claims.holders("A") == [left, RIGHT]
+    assert ask(claims, left, "AB").granted
     assert not ask(claims, MIDDLE, "A").told
 
 

@@ -274,6 +274,7 @@ class Cell(RuleBasedStateMachine):
             if not self.holds[claim]:
                 del self.holds[claim]
 
+        arm.party.inside &= stays
         self.claims.keep(held, stays)
 
     def look(self, arm: Arm) -> None:
@@ -282,6 +283,7 @@ class Cell(RuleBasedStateMachine):
 
     def turn_up(self, arm: Arm) -> None:
         """An arm is where it was not known to be."""
+        arm.party.inside = frozenset(self.pick(PLACES))
         self.take(arm, self.pick(WAYS))
 
     def fail(self, arm: Arm) -> None:
@@ -291,7 +293,7 @@ class Cell(RuleBasedStateMachine):
 
     def recover(self, arm: Arm) -> None:
         """An arm works again, and stands in no zone."""
-        arm.party.failure, arm.moves = None, False
+        arm.party.failure, arm.party.inside, arm.moves = None, frozenset(), False
         held = self.held_by(arm.party)
         for claim in held:
             del self.holds[claim]

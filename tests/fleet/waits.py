@@ -49,9 +49,8 @@ class Scene:
         return [*granted, *vain, *((wait, "all that it waits for waits for it") for wait in self.endless())]
 
     def in_the_way(self, claim: Claim) -> list[Party]:
-        """Who holds what it is for; where it is already, it may go on beside others."""
-        has = {zone for party, zones in self.held if party is claim.party for zone in zones}
-        wanted = claim.zones - has
+        """Who holds what it is for; where it is known to be already, it may go on beside others."""
+        wanted = claim.zones - claim.party.inside
         return [party for party, zones in self.held if party not in claim.own and wanted & zones]
 
     def in_vain(self, claim: Claim) -> Iterator[str]:

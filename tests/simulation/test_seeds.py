@@ -31,9 +31,10 @@ HARD = {
 """What once broke a promise, each found in the scenario as it is now."""
 
 HARD_CELLS = {
-    900895: "an arm that comes to rest and does not tell where, while all wait and nothing else happens",
+    ("cell", 900895): "an arm that comes to rest and does not tell where, while all wait and nothing else happens",
+    ("guards", 50159): "an arm that may be anywhere along its rail, and one with leftovers in its queue",
 }
-"""The same of the scenario of a cell."""
+"""The same of the scenarios of several arms."""
 
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
@@ -54,9 +55,9 @@ def test_seeds_that_once_broke_a_promise(seed: int) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
-@pytest.mark.parametrize("seed", HARD_CELLS, ids=HARD_CELLS.get)
-def test_cells_that_once_broke_a_promise(seed: int) -> None:
-    scenario("cell").run_seed(seed)
+@pytest.mark.parametrize(("of", "seed"), HARD_CELLS, ids=HARD_CELLS.values())
+def test_cells_that_once_broke_a_promise(of: str, seed: int) -> None:
+    scenario(of).run_seed(seed)
 
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
