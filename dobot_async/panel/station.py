@@ -49,7 +49,7 @@ class Station:
         lease: Whose it is.
         works: What it does.
         taught: What it was taught.
-        hold: The hand that holds it in motion, None while none does.
+        holds: The hands that hold it in motion, or will when what they have held before has ended, by their presses.
         follow: What it follows, None while it follows nothing.
         armed_until: The loop's time until which the laser may be on.
     """
@@ -61,7 +61,7 @@ class Station:
         self.lease = Lease(self._begin_lease, self._end_lease, self._lease_changed)
         self.works = Works(self._works_changed)
         self.taught = Taught(self)
-        self.hold: Hold | None = None
+        self.holds: dict[int, Hold] = {}
         self.follow: Any = None
         self.armed_until = 0.0
         self.watched_inputs: tuple[int, ...] = ()
@@ -144,6 +144,11 @@ class Station:
         self._closed.set()
         self._gone.set()
 
+    def let_go(self, why: str) -> None:
+        """End all holds."""
+        for each in self.holds.values():
+            each.end(why)
+
     def start(self, work: Work, doing: Callable[[ArmView], Awaitable[Any]], owner: Party) -> asyncio.Task[Any]:
         """Begin something that moves the arm, for who has the lease; raise Refusal if that cannot be now."""
         self.lease.check(owner)
@@ -162,9 +167,7 @@ class Station:
         """
         view, holder = self.view, self.lease.holder
         self.log(f"{by.name} stops the arm", "warning")
-        if self.hold:
-            self.hold.end("stopped")
-
+        self.let_go("stopped")
         stopping = asyncio.create_task(view.arm.stop(), name=f"dobot_async panel stop of {self.name}")
         self._stops.add(stopping)
         stopping.add_done_callback(self._stop_ended)
@@ -254,9 +257,7 @@ class Station:
 
     async def _end_lease(self) -> None:
         """The arm stands, and nothing burns or turns; what was set for jogs is set back."""
-        if self.hold:
-            self.hold.end("left")
-
+        self.let_go("left")
         await self.works.end()
         view = self._view
         if view is None:

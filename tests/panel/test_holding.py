@@ -84,6 +84,25 @@ async def test_release_stops_it_sooner() -> None:
         assert await stands(sim)
 
 
+async def test_another_press_takes_the_place_of_the_first() -> None:
+    async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
+        page = await operator(join)
+        first, press = page.press("y+")
+        await beats(page, press, 0.5)
+        second, other = page.press("y-")
+        await beats(page, other, 1.0)
+        answer = page.reply(first)
+        assert answer
+        assert answer["value"] == {"why": "another press"}
+        assert not page.reply(second)
+        before = sim.arm.pose.y
+        await beats(page, other, 0.3)
+        assert sim.arm.pose.y < before
+        await beats(page, press, 0.5 + BRAKES)  # the first one is over
+        assert await stands(sim)
+        assert [each.value.cmd for each in jogs(sim)] == [c.JOGKey.BP_DOWN, c.JOGKey.BN_DOWN]
+
+
 async def test_a_press_that_is_over_is_not_revived() -> None:
     async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
         page = await operator(join)
