@@ -43,9 +43,9 @@ def panel(session: Session, /, more: tuple[str, ...], cell_file: Text | None, qr
     """Show arms in the browser, until Ctrl-C.
 
     One arm by its URL as for every command, several as left=URL right=URL, or those of a cell file. sim: is simulated
-    here, with pieces to pick up. The first line of the output is the address to open; it has the token of operators in it if that was made
-    up, which it is at 127.0.0.1. For any other --host give both tokens, by files or in DOBOT_PANEL_OPERATOR and
-    DOBOT_PANEL_VIEWER, or say --make-tokens. Ctrl-C stops what the panel moves.
+    here, with pieces to pick up. The first line of the output is the address to open; it has the token of operators in
+    it if that was made up, which it is at 127.0.0.1. For any other --host give both tokens, by files or in
+    DOBOT_PANEL_OPERATOR and DOBOT_PANEL_VIEWER, or say --make-tokens. Ctrl-C stops what the panel moves.
     """
     if session.trace:
         raise click.UsageError("a panel writes no trace; trace the program that moves the arm")

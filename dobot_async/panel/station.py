@@ -36,7 +36,8 @@ __all__ = ["Station"]
 
 logger = logging.getLogger("dobot_async.panel")
 RETRY = 2.0  # seconds until an arm that did not answer is tried again
-QUICKLY = 2.0  # seconds for what is put in order when a lease ends
+WAY_OUT = 1.9  # seconds for all that is put in order when a lease ends, on a line that is dead as well
+AT_LEAST = 0.1  # seconds of them for what comes last
 SHARED = ("tcp", "ws", "wss", "zenoh")
 """Ways that may lead to a bridge, whose lease lasts as long as the connection: it is given back with the panel's."""
 
@@ -257,6 +258,7 @@ class Station:
 
     async def _end_lease(self) -> None:
         """The arm stands, and nothing burns or turns; what was set for jogs is set back."""
+        deadline = self._now() + WAY_OUT
         self.let_go("left")
         await self.works.end()
         view = self._view
@@ -264,8 +266,8 @@ class Station:
             return
 
         self.armed_until = 0.0
-        with suppress(DobotError):
-            async with asyncio.timeout(QUICKLY):
+        with suppress(DobotError, TimeoutError):
+            async with asyncio.timeout_at(max(deadline, self._now() + AT_LEAST)):
                 if view.tools.dangerous:
                     view.tools.stopped()
                     await view.arm.stop()

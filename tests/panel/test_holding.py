@@ -205,6 +205,40 @@ async def test_who_takes_over_finds_an_arm_that_stands() -> None:
         assert await stands(sim)
 
 
+@pytest.mark.parametrize("held", [True, False])
+async def test_a_dead_line_keeps_the_end_of_the_panel_for_two_seconds(held: bool) -> None:
+    async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (desk, join):
+        page = await operator(join)
+        if held:
+            _, press = page.press("y+")
+            await beats(page, press, 0.5)
+        else:
+            page.send("move_to", arm="arm", x=200.0, y=150.0, z=40.0)
+            await asyncio.sleep(0.3)
+
+        sim.faults.silent = True
+        began = now()
+        await desk.aclose()
+        assert now() - began <= 2.2
+
+
+async def test_a_stop_is_repeated_on_a_dead_line_until_the_arm_hears_it() -> None:
+    async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
+        page, viewer = await operator(join), join(Role.VIEWER)
+        _, press = page.press("y+", speed=5)
+        await beats(page, press, 0.5)
+        sim.faults.silent = True
+        number = viewer.send("stop")
+        await asyncio.sleep(10)
+        answer = viewer.reply(number)
+        assert answer
+        assert answer["error"]["kind"] == "timeout"
+        assert not await stands(sim)
+        sim.faults.silent = False
+        await asyncio.sleep(5)
+        assert await stands(sim)
+
+
 async def test_following_ends_with_the_targets() -> None:
     async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
         page = await operator(join)
