@@ -11,8 +11,9 @@ from typing import Any, TypeGuard, cast
 from urllib.parse import urlsplit
 
 from dobot_async import Box, Cylinder, Fleet
+from dobot_async._core.util.urls import hidden
 from dobot_async.fleet.member import Member
-from dobot_async.transports import SCHEMES, hidden
+from dobot_async.transports import SCHEMES
 
 __all__ = ["Source", "sources_of"]
 
