@@ -53,7 +53,7 @@ def make(folder: Path) -> dict[str, bytes]:
 
     npm("install", f"./{archive.name}", f"esbuild@{ESBUILD}", folder=folder)
     shutil.copy(ENTRY, folder / "entry.js")
-    options = ["--bundle", "--format=esm", "--minify", "--target=es2020", "--legal-comments=none", "--log-level=warning"]
+    options = ["--bundle", "--format=esm", "--minify", "--target=es2020", "--legal-comments=none"]
     result = folder / "three.js"
     esbuild = folder / "node_modules/.bin/esbuild"
     subprocess.run([esbuild, "entry.js", *options, f"--outfile={result}"], cwd=folder, check=True)
