@@ -1,0 +1,51 @@
+// What everybody has to see: no connection, alarms, who controls the arm.
+
+import { button, el, fill, say } from "../dom.js";
+import { icon } from "../icons.js";
+import { toast } from "../dialogs.js";
+
+export function banners(app) {
+  const { texts } = app;
+  const line = el("p.banner.bad", { role: "alert", hidden: true });
+  const alarms = el("div", { role: "alert" });
+  const lease = el("p.banner", { role: "status", hidden: true });
+  const element = el("div.banners", {}, line, alarms, lease);
+  let before = { arm: "", mine: false };
+
+  const showConnection = () => {
+    const { state } = app.connection;
+    line.hidden = state === "open" || (state === "connecting" && !app.model.arms.size);
+    if (!line.hidden) say(line, texts.connection[state]);
+  };
+
+  const showAlarms = () => {
+    const found = app.arm?.alarms ?? [];
+    const recover = button(texts.alarms.recover, () => app.work(recover, texts.alarms.recovering, "recover"), { class: "primary" });
+    fill(alarms, found.length && el("section.banner.bad.alarms", { "aria-label": texts.alarms.title },
+      icon("alarm"),
+      el("div", {}, found.map(({ name, cause, remedy }) => el("div", {},
+        el("h2", {}, name), cause && el("p", {}, cause), remedy && el("p", {}, el("strong", {}, `${texts.alarms.remedy}: `), remedy)))),
+      app.arm.can("recover") && el("fieldset.gate", { disabled: !app.mine }, recover)));
+  };
+
+  const showLease = () => {
+    const { arm } = app;
+    const holder = arm?.lease.holder;
+    const words = !arm ? "" : app.mine ? "" : holder ? texts.lease.held(holder) : app.operator ? texts.lease.needed : "";
+    say(lease, [words, app.operator ? "" : texts.lease.viewer].filter(Boolean).join(". ").replace("..", "."));
+    lease.hidden = app.connection.state !== "open" || !lease.textContent;
+    if (before.arm === arm?.name && before.mine && !app.mine && app.connection.state === "open") {
+      toast(holder ? texts.lease.lostTo(holder) : texts.lease.ended);
+    }
+    before = { arm: arm?.name, mine: app.mine };
+  };
+
+  return {
+    element,
+    update(topic) {
+      if (["select", "connection"].includes(topic)) showConnection();
+      if (["select", "alarms", "lease"].includes(topic)) showAlarms();
+      if (["select", "lease", "connection"].includes(topic)) showLease();
+    },
+  };
+}
