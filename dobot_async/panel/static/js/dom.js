@@ -56,11 +56,11 @@ export function number(label, unit, properties = {}) {
   };
 }
 
-/** A choice of a few, as radio buttons in a row. */
-export function choice(legend, options, chosen, changed) {
+/** A choice of a few, as radio buttons in a row. Its legend is seen only if it is titled. */
+export function choice(legend, options, chosen, changed, { titled = false } = {}) {
   const name = `field-${++fields}`;
   const inputs = new Map();
-  const row = el("fieldset.choice", {}, el("legend", {}, legend), options.map(([value, label]) => {
+  const row = el("fieldset.choice", {}, el("legend", { class: titled ? null : "visually-hidden" }, legend), options.map(([value, label]) => {
     const input = el("input", { type: "radio", name, value, on: { change: () => input.checked && changed(value) } });
     input.checked = value === chosen;
     inputs.set(value, input);

@@ -21,7 +21,7 @@ export function banners(app) {
   const showAlarms = () => {
     const found = app.arm?.alarms ?? [];
     const recover = button(texts.alarms.recover, () => app.work(recover, texts.alarms.recovering, "recover"), { class: "primary" });
-    fill(alarms, found.length && el("section.banner.bad.alarms", { "aria-label": texts.alarms.title },
+    fill(alarms, found.length > 0 && el("section.banner.bad.alarms", { "aria-label": texts.alarms.title },
       icon("alarm"),
       el("div", {}, found.map(({ name, cause, remedy }) => el("div", {},
         el("h2", {}, name), cause && el("p", {}, cause), remedy && el("p", {}, el("strong", {}, `${texts.alarms.remedy}: `), remedy)))),

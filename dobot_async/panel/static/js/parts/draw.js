@@ -55,7 +55,7 @@ export function drawPart(app) {
       return app.complain(error);
     }
     drop.hidden = true;
-    fill(modes, PICTURE.test(dropped.name) && choice(draw.mode, Object.entries(draw.modes), mode, value => { mode = value; read(source); }).row);
+    fill(modes, PICTURE.test(dropped.name) && choice(draw.mode, Object.entries(draw.modes), mode, value => { mode = value; read(source); }, { titled: true }).row);
     if (fields.width.value() === undefined) put();
     return changed();
   };
@@ -134,7 +134,7 @@ export function drawPart(app) {
     if (!arm) return;
     const both = arm.can("draw") && arm.can("engrave");
     tool = arm.can("draw") ? "pen" : "laser";
-    fill(tools, both && choice(draw.tool, [["pen", draw.pen], ["laser", draw.laser]], tool, value => { tool = value; }).row);
+    fill(tools, both && choice(draw.tool, [["pen", draw.pen], ["laser", draw.laser]], tool, value => { tool = value; }, { titled: true }).row);
     outlined = file = null;
     fields.width.set();
     drop.hidden = false;

@@ -53,22 +53,23 @@ export function header(app) {
   };
 }
 
+/** The theme is what the system has, until somebody chooses. */
 function themeButton(app) {
-  const dark = () => (document.documentElement.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";
-  const set = value => { document.documentElement.dataset.theme = value; };
-  const kept = localStorage.getItem(THEME);
-  if (kept === "dark" || kept === "light") set(kept);
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  const root = document.documentElement;
   const show = () => {
-    fill(element, icon(dark() ? "sun" : "moon"));
-    element.setAttribute("aria-label", dark() ? app.texts.theme.light : app.texts.theme.dark);
+    const kept = localStorage.getItem(THEME);
+    root.dataset.theme = kept === "dark" || kept === "light" ? kept : system.matches ? "dark" : "light";
+    const dark = root.dataset.theme === "dark";
+    fill(element, icon(dark ? "sun" : "moon"));
+    element.setAttribute("aria-label", dark ? app.texts.theme.light : app.texts.theme.dark);
     app.update("theme");
   };
   const element = button("", () => {
-    set(dark() ? "light" : "dark");
-    localStorage.setItem(THEME, document.documentElement.dataset.theme);
+    localStorage.setItem(THEME, root.dataset.theme === "dark" ? "light" : "dark");
     show();
   }, { class: "icon-button" });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
+  system.addEventListener("change", show);
   show();
   return element;
 }

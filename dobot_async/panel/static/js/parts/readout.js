@@ -15,7 +15,7 @@ export function readout(app) {
   const resume = button([icon("play"), texts.resume], () => app.act("resume"));
   const power = button([icon("power"), texts.power], () => app.act("power"));
   const gate = el("fieldset.gate.actions", { "aria-label": texts.title }, home, pause, resume, power);
-  const element = el("section.readout", { "aria-label": texts.pose.label }, pose, joints, el("div.activity", {}, moving, doing, bar), gate);
+  const element = el("section.readout", { "aria-label": texts.pose.label }, el("div.figures", {}, pose, joints), el("div.activity", {}, moving, doing, bar), gate);
   let cells = [];
 
   const build = () => {

@@ -28,6 +28,8 @@ function slider(label, unit, properties, done) {
   return { row: el("div.field.slider", {}, el("label", { for: id }, label), input, figure), input, set: value => { if (document.activeElement !== input) { input.value = value; show(); } } };
 }
 
+const CARDS = [["effector", ["suction", "gripper", "gripper_to"]], ["laser", ["laser"]], ["conveyor", ["conveyor"]], ["rail", ["rail"]], ["pins", ["outputs", "inputs"]], ["speed", ["move_to"]]];
+
 const MAKERS = {
   suction(app, { tools, words }) {
     const on = toggle(tools.suction, value => app.act("suction", { on: value }), words);
@@ -42,7 +44,7 @@ const MAKERS = {
     const opening = slider(tools.percent, "%", { id: "gripper", min: 0, max: 100, step: 1, value: 100 }, percent => app.act("gripper_to", { percent }));
     return { elements: [opening.row], show: io => Number.isFinite(io.gripper) && opening.set(io.gripper) };
   },
-  laser: laser,
+  laser,
   conveyor(app, { tools }) {
     const speed = slider(tools.belt, tools.pulses, { id: "belt", min: -15000, max: 15000, step: 500, value: 5000 });
     const motor = el("select", { "aria-label": tools.motor }, [0, 1].map(n => el("option", { value: n }, `${tools.motor} ${n + 1}`)));
@@ -58,6 +60,10 @@ const MAKERS = {
     const to = number(tools.railTo, "mm");
     const drive = button(tools.drive, () => app.work(drive, app.texts.go.busy, "move_rail", { mm: to.value() }), { class: "primary" });
     return { elements: [there.element, el("div.row", {}, to.row, drive)], show: io => { there.show(Number.isFinite(io.rail)); to.input.placeholder = Number.isFinite(io.rail) ? io.rail.toFixed(1) : ""; } };
+  },
+  move_to(app, { tools }) {
+    const speed = slider(tools.motions, "%", { id: "speed", min: 1, max: 100, step: 1, value: 50 }, percent => app.act("speed", { percent }));
+    return { elements: [speed.row], show: () => {} };
   },
   outputs: (app, context) => pins(app, context, "output"),
   inputs: (app, context) => pins(app, context, "input"),
@@ -136,20 +142,11 @@ export function toolsPart(app) {
   const build = () => {
     for (const each of made) each.close?.();
     [made, gates] = [[], []];
-    const { arm } = app;
     const cards = [];
-    const features = Object.keys(MAKERS).filter(name => arm?.can(name));
-    for (const name of features) {
-      if (name === "gripper_to" && arm.can("gripper")) continue;
-      const one = MAKERS[name](app, { tools, words });
-      made.push(one);
-      const more = name === "gripper" && arm.can("gripper_to") ? MAKERS.gripper_to(app, { tools, words }) : null;
-      if (more) made.push(more);
-      cards.push(card(tools[name === "gripper_to" ? "gripper" : name], [...one.elements, ...(more?.elements ?? [])]));
-    }
-    if (arm?.can("move_to")) {
-      const speed = slider(tools.speed, "%", { id: "speed", min: 1, max: 100, step: 1, value: 50 }, percent => app.act("speed", { percent }));
-      cards.push(card(tools.speed, [speed.row]));
+    for (const [title, features] of CARDS) {
+      const ones = features.filter(name => app.arm?.can(name)).map(name => MAKERS[name](app, { tools, words }));
+      made.push(...ones);
+      if (ones.length) cards.push(card(tools[title], ones.flatMap(one => one.elements)));
     }
     fill(element, cards.length ? cards : el("p.hint", {}, tools.none));
     show();

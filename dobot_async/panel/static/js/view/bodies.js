@@ -33,7 +33,7 @@ export function strokesOf(strokes, color) {
 }
 
 /** A line of text that always faces the reader. */
-export function label(text, color, height = 22) {
+export function label(text, color, height = 26) {
   const canvas = document.createElement("canvas");
   const pen = canvas.getContext("2d");
   const font = "600 44px system-ui, sans-serif";
@@ -89,7 +89,7 @@ export function zoneOf(zone, colors, floor) {
     mesh = box([x1 - x0, y1 - y0, z1 - z0], clear(color, 0.14), color);
     mesh.position.set((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2);
   }
-  const name = label(zone.name, color);
+  const name = label(zone.name, colors["view-ink"]);
   name.position.z = (z1 - z0) / 2 + 16;
   mesh.add(name);
   return mesh;
@@ -138,13 +138,13 @@ export class ArmBody extends THREE.Group {
       return mesh;
     });
     this.joints = info.shape.slice(0, -1).map((part, n) => {
-      const ball = new THREE.Mesh(new THREE.SphereGeometry(1.12 * Math.max(part.radius, info.shape[n + 1].radius), 24, 16), joint);
+      const ball = new THREE.Mesh(new THREE.SphereGeometry(1.3 * Math.min(part.radius, info.shape[n + 1].radius), 24, 16), joint);
       this.add(ball);
       return ball;
     });
     const foot = info.shape[0]?.radius ?? 40;
     this.foot = new THREE.Mesh(new THREE.CylinderGeometry(foot * 1.5, foot * 1.6, 10, 40).rotateX(Math.PI / 2), joint);
-    this.tip = new THREE.Mesh(new THREE.SphereGeometry(6, 16, 12), new THREE.MeshBasicMaterial({ color: colors["view-target"] }));
+    this.tip = new THREE.Mesh(new THREE.SphereGeometry(Math.max(6, 1.15 * (info.shape.at(-1)?.radius ?? 0)), 16, 12), new THREE.MeshBasicMaterial({ color: colors["view-target"] }));
     this.add(this.foot, this.tip);
   }
 

@@ -73,6 +73,9 @@ export class View3D {
     for (const zone of this.model.zones) this.scene.add(zoneOf(zone, colors, floor));
     [...this.model.arms.values()].forEach((arm, n) => this.addArm(arm, n));
     this.update();
+    const names = [...this.model.arms.keys()].join();
+    if (this.controls && names !== this.names) this.home();
+    this.names = names;
   }
 
   addArm(arm, number) {
@@ -82,7 +85,7 @@ export class View3D {
     trace.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(TRACE * 3), 3));
     trace.frustumCulled = false;
     const target = targetOf(this.colors);
-    const name = this.model.arms.size > 1 ? label(arm.name, color, 26) : null;
+    const name = this.model.arms.size > 1 ? label(arm.name, color, 34) : null;
     body.visible = target.visible = false;
     this.scene.add(reachOf(arm.info, this.colors, this.floor), body, trace, target);
     if (name) body.add(name);
@@ -158,9 +161,9 @@ export class View3D {
     const [xs, ys] = [places.map(place => place[0]), places.map(place => place[1])];
     const middle = places.length ? [(Math.min(...xs) + Math.max(...xs)) / 2, (Math.min(...ys) + Math.max(...ys)) / 2] : [0, 0];
     const spread = places.length ? Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys)) : 0;
-    const far = (700 + 0.9 * spread) * Math.max(1, 0.85 / (this.camera.aspect || 1));
-    this.controls.target.set(middle[0] + 100, middle[1], this.floor + 130);
-    this.camera.position.set(middle[0] + 100 + 0.68 * far, middle[1] - 0.72 * far, this.floor + 130 + 0.5 * far);
+    const far = (760 + (0.9 * spread) / Math.max(1, this.camera.aspect)) * Math.max(1, 0.85 / this.camera.aspect);
+    this.controls.target.set(middle[0] + 110, middle[1], this.floor + 120);
+    this.camera.position.set(middle[0] + 110 + 0.68 * far, middle[1] - 0.72 * far, this.floor + 120 + 0.5 * far);
     this.controls.update();
     this.request();
   }
