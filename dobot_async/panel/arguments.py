@@ -57,7 +57,7 @@ class Arguments:
         """Return true or false."""
         value = self._given.pop(name, default)
         if not isinstance(value, bool):
-            raise ValueError(f"{name} must be true or false")
+            raise ValueError(f"{name} must be true or false")  # noqa: TRY004 - not the caller's type, but a page's
 
         return value
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 import asyncio
 from collections import Counter
 from collections.abc import Callable
-from weakref import WeakSet
 
+from aiohttp.web import Server
 from aiohttp.web_protocol import RequestHandler
 
 from dobot_async.bridge.handshake import HANDSHAKE, PENDING
@@ -38,30 +38,24 @@ class Doorkeeper:
     """See the module; called for each connection.
 
     Args:
-        make: Makes what serves a connection.
+        server: Makes what serves a connection.
         refuse: Called with whom was not let in, and why.
     """
 
-    def __init__(self, make: Callable[[], RequestHandler], refuse: Callable[[str, str], None]) -> None:
-        self._make = make
+    def __init__(self, server: Server, refuse: Callable[[str, str], None]) -> None:
+        self._server = server
         self._refuse = refuse
         self._loop = asyncio.get_running_loop()
         self._pending: dict[RequestHandler, asyncio.TimerHandle] = {}
-        self._all: WeakSet[RequestHandler] = WeakSet()
-        self._handshake = HANDSHAKE
 
     def __call__(self) -> asyncio.BaseProtocol:
         """Somebody has connected."""
-        open_ones = sum(1 for each in self._all if each.transport is not None)
-        if open_ones >= MOST:
+        if len(self._server.connections) >= MOST:
             self._refuse("?", "there are too many connections")
             return Refused()
 
-        handler = self._make()
-        self._all.add(handler)
-        self._pending[handler] = self._loop.call_later(
-            self._handshake, self._cut, handler, "it has not come in in time"
-        )
+        handler = self._server()
+        self._pending[handler] = self._loop.call_later(HANDSHAKE, self._cut, handler, "it has not come in in time")
         if len(self._pending) > PENDING:
             self._make_room()
 

@@ -296,7 +296,7 @@ class Station:
 
     async def _darken(self, view: ArmView) -> None:
         """Switch the laser off when its time is over."""
-        while self.armed:  # it may be allowed for longer meanwhile
+        while self.armed:  # noqa: ASYNC110 - it may be allowed for longer meanwhile
             await asyncio.sleep(self.armed)
 
         if view.tools.laser:

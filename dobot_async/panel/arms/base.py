@@ -81,7 +81,7 @@ class ArmView(ABC):
 
     parts: Sequence[Part]
     jogs_at = "percent"
-    pins: Mapping[str, Sequence[int]] = {"outputs": (), "inputs": ()}
+    pins: ClassVar[Mapping[str, Sequence[int]]] = {"outputs": (), "inputs": ()}
 
     def __init__(self, arm: Any) -> None:
         self.arm = arm
@@ -176,7 +176,7 @@ class ArmView(ABC):
 
         return True
 
-    async def begin(self) -> None:
+    async def begin(self) -> None:  # noqa: B027 - most arms have no queue of their own
         """Let nothing that an earlier program has left in the arm's own queue begin to move."""
 
     async def move_joints(self, joints: Sequence[float]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 from dobot_async import Gripper, Jog, Laser, Magician, Pen, PTPMode, SuctionCup
 from dobot_async.magician import commands as c
@@ -44,7 +44,7 @@ class MagicianView(ArmView):
         Part("forearm", "box", 18.0),
         Part("hand", "cylinder", 14.0),
     )
-    pins = {"outputs": range(1, 21), "inputs": range(1, 21)}
+    pins: ClassVar[Mapping[str, Sequence[int]]] = {"outputs": range(1, 21), "inputs": range(1, 21)}
     arm: Magician
 
     @property

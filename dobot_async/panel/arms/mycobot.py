@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 from dobot_async import MyCobot
 from dobot_async.mycobot.jog import jog_words
@@ -24,7 +24,7 @@ class CobotView(ArmView):
 
     family = "mycobot"
     features = ("gripper", "gripper_to", "outputs", "inputs", "power")
-    pins = {"outputs": (19, 23, 26, 33), "inputs": (19, 22, 26, 32, 39)}
+    pins: ClassVar[Mapping[str, Sequence[int]]] = {"outputs": (19, 23, 26, 33), "inputs": (19, 22, 26, 32, 39)}
     arm: MyCobot
 
     def __init__(self, arm: Any) -> None:

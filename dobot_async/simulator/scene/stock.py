@@ -176,8 +176,9 @@ class Stock:
         blocks, belts = tuple(blocks), tuple(belts)
         self._blocks = [Standing(each.name, Solid(self._base(each.at, each.yaw), each.size)) for each in blocks]
         self.belts: Sequence[RunningBelt] = [RunningBelt(each, self._base(each.at, each.yaw)) for each in belts]
-        self.fixtures: tuple[Block | Belt, ...] = tuple(
-            replace(each, at=self._base(each.at, each.yaw).place) for each in (*blocks, *belts)
+        self.fixtures: tuple[Block | Belt, ...] = (
+            *(replace(each, at=self._base(each.at, each.yaw).place) for each in blocks),
+            *(replace(each, at=self._base(each.at, each.yaw).place) for each in belts),
         )
         self.pieces: dict[str, Workpiece] = {}
         names = [each.name for each in self.fixed]
