@@ -78,7 +78,8 @@ export const texts = {
     conveyor: "Conveyor", belt: "Speed", pulses: "pulses/s", run: "Run", motor: "Motor",
     rail: "Rail", railOn: "There is a rail", railTo: "Position", drive: "Drive",
     outputs: "Outputs", inputs: "Inputs", pin: "Pin", configureOut: "Use as output", configureIn: "Use as input", high: "high", low: "low",
-    unknown: "not known", speed: "Speed", motions: "Of motions", effector: "End effector", pins: "Inputs and outputs", none: "This arm has no tools that can be switched here.",
+    unknown: "not known", onArm: "On the arm", onArmNames: { suction: "Suction cup", gripper: "Gripper", pen: "Pen", laser: "Laser" }, notSaid: "not said",
+    speed: "Speed", motions: "Of motions", effector: "End effector", pins: "Inputs and outputs", none: "This arm has no tools that can be switched here.",
     output: pin => `Output ${pin}`, input: pin => `Input ${pin}`,
   },
   teach: {

@@ -4,6 +4,11 @@ import { button, el, fill, say } from "../dom.js";
 import { icon } from "../icons.js";
 import { toast } from "../dialogs.js";
 
+/** A name in capitals, as manuals have it, in words: JOINT_LIMIT is "Joint limit". */
+function inWords(name) {
+  return /^[A-Z0-9_]+$/.test(name) ? name[0] + name.slice(1).toLowerCase().replaceAll("_", " ") : name;
+}
+
 export function banners(app) {
   const { texts } = app;
   const line = el("p.banner.bad", { role: "alert", hidden: true });
@@ -18,14 +23,16 @@ export function banners(app) {
     if (!line.hidden) say(line, texts.connection[state]);
   };
 
+  const words = ({ name, cause, remedy }) => el("div", {},
+    el("h2", {}, inWords(name)), cause && el("p", {}, cause), remedy && el("p", {}, el("strong", {}, `${texts.alarms.remedy}: `), remedy));
+
   const showAlarms = () => {
     const found = app.arm?.alarms ?? [];
+    const bad = found.filter(alarm => !alarm.harmless);
     const recover = button(texts.alarms.recover, () => app.work(recover, texts.alarms.recovering, "recover"), { class: "primary" });
-    fill(alarms, found.length > 0 && el("section.banner.bad.alarms", { "aria-label": texts.alarms.title },
-      icon("alarm"),
-      el("div", {}, found.map(({ name, cause, remedy }) => el("div", {},
-        el("h2", {}, name), cause && el("p", {}, cause), remedy && el("p", {}, el("strong", {}, `${texts.alarms.remedy}: `), remedy)))),
-      app.arm.can("recover") && el("fieldset.gate", { disabled: !app.mine }, recover)));
+    fill(alarms, found.length > 0 && el("section", { class: `banner alarms ${bad.length ? "bad" : ""}`, "aria-label": texts.alarms.title },
+      icon("alarm"), el("div", {}, (bad.length ? bad : found).map(words)),
+      bad.length > 0 && app.arm.can("recover") && el("fieldset.gate", { disabled: !app.mine }, recover)));
   };
 
   const showLease = () => {

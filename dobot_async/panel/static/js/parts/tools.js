@@ -28,9 +28,15 @@ function slider(label, unit, properties, done) {
   return { row: el("div.field.slider", {}, el("label", { for: id }, label), input, figure), input, set: value => { if (document.activeElement !== input) { input.value = value; show(); } } };
 }
 
-const CARDS = [["effector", ["suction", "gripper", "gripper_to"]], ["laser", ["laser"]], ["conveyor", ["conveyor"]], ["rail", ["rail"]], ["pins", ["outputs", "inputs"]], ["speed", ["move_to"]]];
+const CARDS = [["effector", ["end_effector", "suction", "gripper", "gripper_to"]], ["laser", ["laser"]], ["conveyor", ["conveyor"]], ["rail", ["rail"]], ["pins", ["outputs", "inputs"]], ["speed", ["move_to"]]];
 
 const MAKERS = {
+  end_effector(app, { tools }) {
+    const names = Object.entries(tools.onArmNames);
+    const select = el("select", { id: "end-effector", on: { change: () => select.value && app.act("end_effector", { tool: select.value }) } },
+      [["", tools.notSaid], ...names].map(([value, name]) => el("option", { value }, name)));
+    return { elements: [el("div.field", {}, el("label", { for: select.id }, tools.onArm), el("span.entry", {}, select))], show: () => {} };
+  },
   suction(app, { tools, words }) {
     const on = toggle(tools.suction, value => app.act("suction", { on: value }), words);
     return { elements: [on.element], show: io => on.show(io.suction) };

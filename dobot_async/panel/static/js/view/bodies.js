@@ -144,7 +144,7 @@ export class ArmBody extends THREE.Group {
     });
     const foot = info.shape[0]?.radius ?? 40;
     this.foot = new THREE.Mesh(new THREE.CylinderGeometry(foot * 1.5, foot * 1.6, 10, 40).rotateX(Math.PI / 2), joint);
-    this.tip = new THREE.Mesh(new THREE.SphereGeometry(Math.max(6, 1.15 * (info.shape.at(-1)?.radius ?? 0)), 16, 12), new THREE.MeshBasicMaterial({ color: colors["view-target"] }));
+    this.tip = new THREE.Mesh(new THREE.SphereGeometry(7, 16, 12), new THREE.MeshBasicMaterial({ color: colors["view-target"] }));
     this.add(this.foot, this.tip);
   }
 
