@@ -59,11 +59,13 @@ class TurnedAway(Exception):
 
     Attributes:
         status: Of HTTP.
+        words: What it is told.
     """
 
-    def __init__(self, status: int, text: str) -> None:
+    def __init__(self, status: int, text: str, words: str = "") -> None:
         super().__init__(text)
         self.status = status
+        self.words = words or text
 
 
 @dataclass(frozen=True, slots=True)

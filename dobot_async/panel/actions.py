@@ -195,7 +195,7 @@ def jog(call: Call) -> Coroutine[Any, Any, Any]:
     direction = call.given.word("direction", station.view.words)
     percent, press = call.given.number("speed", 1, 100, 20), call.given.whole("press", 0, 2**53)
     hold = new_hold(call, press)
-    station.check_press(press)
+    session.check_press(press)
 
     def begun(_: None) -> None:
         session.tell("jog", arm=station.name, press=press, state="moving", why="")

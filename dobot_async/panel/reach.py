@@ -5,8 +5,10 @@ Rays from the axis of joint 1 are looked at every few mm, and each change betwee
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -58,7 +60,7 @@ def along(inside: Inside, degrees: float) -> Callable[[float], bool]:
 
 def outline(view: ArmView, z: float) -> list[Ring]:
     """Return rings around all that can be reached at a height, mm in the arm's coordinates."""
-    rays = [(angle, spans(along(lambda x, y: view.reaches(x, y, z), angle))) for angle in range(-180, 180, TURN)]
+    rays = [(angle, spans(along(partial(view.reaches, z=z), angle))) for angle in range(-180, 180, TURN)]
     return [ring(run) for run in runs(rays)]
 
 
@@ -90,16 +92,23 @@ def ring(run: Sequence[tuple[float, float, float]]) -> Ring:
     ]
 
 
-def reach_of_view(view: ArmView) -> dict[str, Any]:
-    """Return the nearest and farthest distance from the axis, the heights, and how far joint 1 turns."""
-    found = [(z, each) for z in HEIGHTS for each in spans(along(lambda x, y, z=z: view.reaches(x, y, z), 0.0))]  # type: ignore[misc]
+async def reach_of_view(view: ArmView) -> dict[str, Any]:
+    """Return the nearest and farthest distance from the axis, the heights, and how far joint 1 turns.
+
+    Between two heights others have their turn.
+    """
+    found: list[tuple[float, float, float]] = []
+    for z in HEIGHTS:
+        found += [(z, *each) for each in spans(along(partial(view.reaches, z=z), 0.0))]
+        await asyncio.sleep(0)
+
     low, high = view.joint_limits[0]
     if not found:
         return {"inner": 0.0, "outer": 0.0, "z": [0.0, 0.0], "sector": [low, high]}
 
     return {
-        "inner": min(near for _, (near, _) in found),
-        "outer": max(far for _, (_, far) in found),
-        "z": [min(z for z, _ in found), max(z for z, _ in found)],
+        "inner": min(near for _, near, _ in found),
+        "outer": max(far for _, _, far in found),
+        "z": [min(z for z, _, _ in found), max(z for z, _, _ in found)],
         "sector": [low, high],
     }

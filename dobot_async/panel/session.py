@@ -50,6 +50,7 @@ class Session:
         self.gone = False
         self.yields = True
         self.outlet = Outlet()
+        self._press = -1
         self._rate = Allowance(RATE, asyncio.get_running_loop().time, most=BURST)
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -76,6 +77,13 @@ class Session:
     def tell(self, kind: str, **more: Any) -> None:
         """Send it something."""
         self.outlet.put(as_json({"type": kind, **more}))
+
+    def check_press(self, press: int) -> None:
+        """Raise Refusal for a press that is not newer than the last one."""
+        if press <= self._press:
+            raise Refusal("late", f"press {press} is over: the last one was {self._press}")
+
+        self._press = press
 
     def rename(self, name: str) -> None:
         """Be called so from now on."""

@@ -89,7 +89,6 @@ class Station:
         self._told = told
         self._now = asyncio.get_running_loop().time
         self._view: ArmView | None = None
-        self._press = -1
         self._gone = asyncio.Event()
         self._closed = asyncio.Event()
         self._darkening: asyncio.Task[None] | None = None
@@ -164,13 +163,6 @@ class Station:
         """Let `run` end."""
         self._closed.set()
         self._gone.set()
-
-    def check_press(self, press: int) -> None:
-        """Raise Refusal for a press that is not newer than the last one."""
-        if press <= self._press:
-            raise Refusal("late", f"press {press} is over: the last one was {self._press}")
-
-        self._press = press
 
     def start(self, work: Work, doing: Callable[[ArmView], Awaitable[Any]], owner: Party) -> asyncio.Task[Any]:
         """Begin something that moves the arm, for who has the lease; raise Refusal if that cannot be now."""

@@ -53,7 +53,7 @@ class Watch:
     async def run(self, view: ArmView) -> None:
         """Read until it is cancelled, or the link is gone."""
         hub, due = self._station.hub, {"seldom": -math.inf, "inputs": -math.inf}
-        self.reach = await asyncio.to_thread(reach_of_view, view)
+        self.reach = await reach_of_view(view)
         self._station.described()
         self.tools_changed()
         while True:

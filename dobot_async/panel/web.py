@@ -42,7 +42,7 @@ STATUS = {"rate": 429, "busy": 429, "role": 403, "lease": 403, "link": 503}
 WELCOME = '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0;url=/"><title>Panel</title>'
 NOT_IN = (
     "This panel wants to know you: open the address that was shown where it was started, with its token, or the QR "
-    "code.\n"
+    "code."
 )
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -108,7 +108,7 @@ class Web:
             response = plain(error.status, f"{error.reason}\n")
         except TurnedAway as error:
             self._turned_away(request.remote or "?", str(error))
-            response = plain(error.status, f"{error}\n")
+            response = plain(error.status, f"{error.words}\n")
             response.force_close()
         except (Refusal, ValueError, ImportError) as error:
             what = told(error)
@@ -138,7 +138,7 @@ class Web:
 
         role = access.role_of_cookie(request.cookies.get(access.cookie_name, ""))
         if role is None:
-            raise TurnedAway(401, NOT_IN.strip())
+            raise TurnedAway(401, "it has no cookie", NOT_IN)
 
         self._known(request)
         request["role"] = role
