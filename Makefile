@@ -1,4 +1,5 @@
 # make demo      a pick-and-place cycle on the built-in simulator, over a real pseudo-terminal
+# make panel     a simulated arm in the browser: make panel [URL=sim:] [HOST=127.0.0.1] [PORT=8080]
 # make test      ruff, mypy and the whole test suite
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
@@ -11,10 +12,17 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all test-minimum check pytest format clean fuzz promises soak
+.PHONY: demo panel test test-all test-minimum check pytest format clean fuzz promises soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
+
+URL ?= sim:
+HOST ?= 127.0.0.1
+PORT ?= 8080
+
+panel: $(VENV)/.panel
+	$(BIN)/python -m dobot_async --url '$(URL)' panel --host '$(HOST)' --port '$(PORT)'
 
 test: check pytest
 
@@ -80,9 +88,13 @@ $(VENV)/.cli: $(VENV)/.venv pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[cli]'
 	touch $@
 
+$(VENV)/.panel: $(VENV)/.venv pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[cli,panel]'
+	touch $@ $(VENV)/.cli
+
 $(VENV)/.dev: $(VENV)/.venv pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	touch $@ $(VENV)/.cli
+	touch $@ $(VENV)/.cli $(VENV)/.panel
 
 clean:
 	rm -rf .venv .venv-minimum .venv-3.* build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis

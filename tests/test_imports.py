@@ -33,6 +33,7 @@ LAYERS = (
     ("simulator", "bridge"),
     ("toolpath", "handling"),
     ("teaching",),
+    ("panel",),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )
@@ -116,7 +117,7 @@ def test_modules_are_named_as_strings_in_the_places_alone_that_import_late() -> 
 @pytest.mark.parametrize("statement", ["import dobot_async", "from dobot_async import Magician, open_transport"])
 def test_importing_the_package_brings_in_nothing_that_is_not_used_yet(statement: str) -> None:
     late = ["serial", "serial_asyncio", "bleak", "zenoh", "click", "rich", "dobot_async.simulator", "dobot_async.cli"]
-    late += ["dobot_async.toolpath", "svgelements", "ezdxf", "PIL", "numpy", "potrace", "HersheyFonts"]
+    late += ["dobot_async.toolpath", "svgelements", "ezdxf", "PIL", "numpy", "potrace", "HersheyFonts", "aiohttp"]
     late += [f"dobot_async.{family}.commands" for family in FAMILIES] if statement == "import dobot_async" else []
     program = f"{statement}\nimport sys\nprint([name for name in {late!r} if name in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)

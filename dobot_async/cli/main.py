@@ -44,6 +44,7 @@ COMMANDS = {
     "jog": ("dobot_async.cli.commands:jog", "Jog in a direction for a time."),
     "monitor": ("dobot_async.cli.monitor:monitor", "Watch pose, queue and alarms."),
     "move": ("dobot_async.cli.commands:move", "Move the tool to a point."),
+    "panel": ("dobot_async.cli.panel:panel", "Show arms in the browser, and move them there."),
     "play": ("dobot_async.cli.teach:play_recording", "Play what an arm was taught."),
     "pose": ("dobot_async.cli.commands:pose", "Tell where tool and joints are, in mm and degrees."),
     "run": ("dobot_async.cli.program:run_program", "Run a program file."),

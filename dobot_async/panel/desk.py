@@ -72,6 +72,7 @@ class Desk:
         if self._ticking:
             await cancel_and_join(self._ticking)
 
+        self.hub.lines.close()
         for task in self._tasks:
             task.result()
 

@@ -15,6 +15,8 @@ from collections import deque
 from collections.abc import Hashable, Mapping
 from typing import Any
 
+from dobot_async.events import Events
+
 __all__ = ["Hub", "Outlet", "as_json"]
 
 MOST = 500  # messages that wait for one page
@@ -97,10 +99,12 @@ class Hub:
 
     Attributes:
         watched: Set while there is one: nothing is read from an arm while there is none.
+        lines: The lines of the log, for the program.
     """
 
     def __init__(self) -> None:
         self.watched = asyncio.Event()
+        self.lines: Events[Mapping[str, Any]] = Events()
         self._outlets: set[Outlet] = set()
         self._shown: dict[Hashable, str] = {}
         self._log: deque[str] = deque(maxlen=LOG)
@@ -136,6 +140,7 @@ class Hub:
 
     def log(self, **line: Any) -> None:
         """Tell everybody a line of the log."""
+        self.lines.publish(line)
         text = as_json({"type": "log", **line})
         self._log.append(text)
         self._send(text)

@@ -164,10 +164,15 @@ class Session:
             self.tell("reply", id=number, ok=True, value=value)
 
 
+def refuse(word: str) -> None:
+    """What JSON has no word for."""
+    raise ValueError(word)
+
+
 def parsed(text: str) -> dict[str, Any]:
     """Return the object in a message; raise ValueError for anything else."""
     try:
-        found = json.loads(text)
+        found = json.loads(text, parse_constant=refuse)
     except (ValueError, RecursionError):
         raise ValueError("a message is a JSON object") from None
 

@@ -20,6 +20,7 @@ from dobot_async import Arm, Box, ConnectFailed, Cylinder, Fleet
 from dobot_async._core.util.tasks import cancel_and_join, run_shielded
 from dobot_async.bridge.doors import served_with
 from dobot_async.bridge.handshake import HANDSHAKE
+from dobot_async.events import Events
 from dobot_async.fleet.member import Member
 from dobot_async.panel.access import Access, Role, is_loopback
 from dobot_async.panel.desk import Desk
@@ -74,6 +75,11 @@ class Panel:
     def with_token(self, url: str, role: Role) -> str:
         """Return a URL that lets its reader in."""
         return f"{url}?token={self._access.operator if role is Role.OPERATOR else self._access.viewer}"
+
+    @property
+    def events(self) -> Events[Mapping[str, Any]]:
+        """What happens, in lines: each with `time` (of the clock on the wall), `text` and `level`."""
+        return self._desk.hub.lines
 
     @property
     def pages(self) -> int:

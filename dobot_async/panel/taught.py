@@ -60,7 +60,8 @@ class Taught:
 
     def remove(self, index: int) -> None:
         """Take a step out."""
-        self.set([step for number, step in enumerate(self._known.steps) if number != self._at(index)])
+        out = self._at(index)
+        self.set([step for number, step in enumerate(self._known.steps) if number != out])
 
     def move(self, index: int, to: int) -> None:
         """Put a step at another place of the list."""

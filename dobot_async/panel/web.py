@@ -136,13 +136,22 @@ class Web:
         if navigates and "token" in request.query:
             return self._welcome(request.query["token"], request)
 
-        role = access.role_of_cookie(request.cookies.get(access.cookie_name, ""))
+        self._role(request)
+        self._known(request)
+        return await handler(request)
+
+    def _role(self, request: web.Request) -> Role:
+        """Return what who asks may do; raise TurnedAway for strangers."""
+        role = self._access.role_of_cookie(request.cookies.get(self._access.cookie_name, ""))
         if role is None:
             raise TurnedAway(401, "it has no cookie", NOT_IN)
 
-        self._known(request)
-        request["role"] = role
-        return await handler(request)
+        return role
+
+    def _check_operator(self, request: web.Request) -> None:
+        """Raise Refusal for viewers."""
+        if self._role(request) is not Role.OPERATOR:
+            raise Refusal("role", "viewers look on, and stop")
 
     def _welcome(self, token: str, request: web.Request) -> web.Response:
         """Give who has a token its cookie; the page comes by a request of its own, for which that counts."""
@@ -167,7 +176,7 @@ class Web:
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         """Serve a page until it goes, or does not answer any more."""
-        session = self._desk.join(request["role"], request.remote or "?")
+        session = self._desk.join(self._role(request), request.remote or "?")
         socket = web.WebSocketResponse(heartbeat=PINGS, max_msg_size=LARGEST_MESSAGE, compress=False, timeout=1.0)
         socket.headers.update(HEADERS)
         pumping: asyncio.Task[None] | None = None
@@ -192,7 +201,7 @@ class Web:
 
     async def _upload(self, request: web.Request) -> web.Response:
         """Take a file to be drawn."""
-        check_operator(request)
+        self._check_operator(request)
         self._desk.station(request.query.get("arm"))
         name, mode = printable(request.query.get("name", ""), 100), request.query.get("mode", "outline")
         if mode not in MODES:
@@ -203,7 +212,7 @@ class Web:
 
     async def _load(self, request: web.Request) -> web.Response:
         """Take a recording, which the page loads by `teach_load`."""
-        check_operator(request)
+        self._check_operator(request)
         station = self._desk.station(request.match_info["name"])
         data = await self._body(request, LARGEST_RECORDING)
         return as_json(await station.taught.add(data, printable(request.query.get("name", ""), 100)))
@@ -268,12 +277,6 @@ async def pump(session: Session, socket: web.WebSocketResponse) -> None:
         return
 
     await socket.close(code=1001, message=b"the panel leaves this page")
-
-
-def check_operator(request: web.Request) -> None:
-    """Raise Refusal for viewers."""
-    if request["role"] is not Role.OPERATOR:
-        raise Refusal("role", "viewers look on, and stop")
 
 
 def served(page: Page | None, request: web.Request) -> web.Response:
