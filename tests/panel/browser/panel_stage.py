@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from playwright.async_api import Browser, BrowserContext, ConsoleMessage, Page, Request, expect
+from playwright.async_api import Browser, BrowserContext, ConsoleMessage, Error, Page, Request, expect
 
 from dobot_async import Magician
 from dobot_async.panel import Panel, panel
@@ -225,9 +225,13 @@ class Stage:
         assert not self.sim.arm.alarms
 
     async def close(self) -> None:
-        """Close all pages."""
-        for shown in self.shown:
-            with suppress(Exception):
+        """Close all pages; what they say at last is shown with a test that failed."""
+        for number, shown in enumerate(self.shown):
+            with suppress(Error):
+                said = "[...document.querySelectorAll('#toasts, .banners, .log')].map(each => each.innerText).join('\\n')"
+                print(f"page {number}:", await asyncio.wait_for(shown.page.evaluate(said), 2.0), *shown.console, sep="\n")
+
+            with suppress(Error):
                 await shown.context.close()
 
 

@@ -74,8 +74,8 @@ async def test_a_release_that_is_never_heard_does_not_keep_it_going(magician: St
     await phone.page.evaluate(silence)
     await magician.hold(phone, "Jog y+")
     await phone.page.mouse.up()
-    await magician.stands()
     await expect(phone.page.get_by_text("lost sight of the button")).to_be_visible()
+    await magician.stands()
 
 
 async def test_a_window_that_loses_the_focus_while_holding_stops_it(magician: Stage) -> None:
@@ -120,8 +120,8 @@ async def test_the_stop_is_in_reach_and_ends_what_is_held(magician: Stage) -> No
     await phone.tab("Jog")
     await magician.hold(phone, "Jog y+")
     await phone.page.keyboard.press("Escape")
-    await magician.stands()
     await expect(phone.page.get_by_text("Stopped", exact=True)).to_be_visible()
+    await magician.stands()
     stood = magician.where()
     await phone.page.mouse.up()
     assert distance(magician.where(), stood) < 0.01

@@ -2,6 +2,7 @@
 
 import { texts } from "./texts.js";
 import { toast } from "./dialogs.js";
+import { releaseAll } from "./hold.js";
 
 const FASTEST = 1000 / 30; // ms between two targets
 
@@ -67,6 +68,13 @@ export class Follower {
     if (this.arm) this.app.connection.tell("release", { arm: this.arm.name });
     if (reason === "lost") toast(texts.jog.ended(texts.jog.lost));
     this.over();
+  }
+
+  /** The server says that it is over. */
+  ended(why) {
+    if (this.state === "idle") return;
+    releaseAll("ended");
+    toast(texts.follow.ended(why), "error");
   }
 
   over() {

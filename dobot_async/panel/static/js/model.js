@@ -17,6 +17,7 @@ class Arm {
     this.lease = { holder: null, mine: false };
     this.recording = { steps: [], problems: [], modes: [] };
     this.jog = null;
+    this.follow = null;
     this.trace = [];
     this.target = null; // [x, y, z] that is shown, in the arm's coordinates
     this.drawing = []; // lines of a drawing that is being placed, in the arm's coordinates
@@ -64,7 +65,7 @@ export class Model {
         return "";
       case "state": arm?.moved(message); break;
       case "alarms": if (arm) arm.alarms = message.alarms; break;
-      case "link": case "queue": case "io": case "lease": case "recording": case "jog":
+      case "link": case "queue": case "io": case "lease": case "recording": case "jog": case "follow":
         if (arm) arm[message.type] = message;
         break;
       default: return null;

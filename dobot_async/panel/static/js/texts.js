@@ -1,5 +1,8 @@
 // Every text of the page, in English. What the server says (alarms, errors, the log) is shown as it comes.
 
+/** A direction with a sign that is read as "minus". */
+const signed = direction => direction.replace("-", "−");
+
 const counted = (n, one, more) => `${n} ${n === 1 ? one : more}`;
 
 export const texts = {
@@ -52,7 +55,8 @@ export const texts = {
     title: "Jog", frame: "Frame", tool: "Tool", joint: "Joints", step: "Step size", hold: "Hold",
     holdHint: "Hold a button to move; let go to stop.", stepHint: "Each press moves one step.",
     speed: "Jog speed", percent: "%",
-    press: direction => `Jog ${direction}`, one: (direction, size) => `Move ${direction} by ${size}`,
+    press: direction => `Jog ${signed(direction)}`, one: (direction, size) => `Move ${signed(direction)} by ${size}`,
+    signed,
     ended: why => `Jogging ended: ${why}`,
     lost: "the page lost sight of the button",
   },
@@ -62,12 +66,13 @@ export const texts = {
     number: "Type numbers.",
   },
   follow: {
-    title: "Follow", pad: "Drag here to lead the tool in x and y", height: "Drag here to lead the tool in z",
+    title: "Follow", pad: "x, y: drag here to lead the tool", height: "z: drag here to lift and lower the tool",
     hint: "The tool follows your finger while it is down. Dragging the tool in the picture does the same.",
     drag: "Drag the tool in the picture", speed: "Top speed", unit: "mm/s",
     padLabel: "x, y", heightLabel: "z",
     gamepad: "Gamepad", noGamepad: "Press a button of a gamepad to use it here.",
     gamepadHint: "Hold R1 and use the sticks: left for x and y, right for z. B stops all arms.",
+    ended: why => `Following ended: ${why}`,
     starting: "Starting …", active: "Following", idle: "Ready",
   },
   tools: {

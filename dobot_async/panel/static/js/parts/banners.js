@@ -42,7 +42,7 @@ export function banners(app) {
     say(lease, [words, app.operator ? "" : texts.lease.viewer].filter(Boolean).join(". ").replace("..", "."));
     lease.hidden = app.connection.state !== "open" || !lease.textContent;
     if (before.arm === arm?.name && before.mine && !app.mine && app.connection.state === "open") {
-      toast(holder ? texts.lease.lostTo(holder) : texts.lease.ended);
+      toast(holder ? texts.lease.lostTo(holder) : texts.lease.ended, "error");
     }
     before = { arm: arm?.name, mine: app.mine };
   };

@@ -64,6 +64,7 @@ export function followPart(app) {
   return {
     element,
     update(topic) {
+      if (topic === "follow" && app.arm.follow.state === "ended") follower.ended(app.arm.follow.why);
       if (topic === "select") element.hidden = !app.arm?.can("follow");
       if (["select", "lease", "connection"].includes(topic)) gate.disabled = !app.mine;
     },

@@ -85,11 +85,11 @@ export function jogPart(app) {
     const cross = words.filter(word => CROSS.has(word));
     const rest = words.filter(word => !CROSS.has(word));
     const [flat, high] = [cross.filter(word => word[0] !== "z"), cross.filter(word => word[0] === "z")];
-    const big = word => control(word, [icon(CROSS.get(word)[0]), el("span", {}, word.replace("-", "−"))], CROSS.get(word)[1]);
+    const big = word => control(word, [icon(CROSS.get(word)[0]), el("span", {}, texts.jog.signed(word))], CROSS.get(word)[1]);
     return [
       el("div.cross", {}, flat.map(big), el("span.middle", { "aria-hidden": "true" }, "x y")),
       el("div.column", {}, high.map(big)),
-      el("div.pairs", {}, rest.map(word => control(word, [icon(word.endsWith("+") ? "ccw" : "cw"), el("span", {}, word.replace("-", "−"))], "turn"))),
+      el("div.pairs", {}, rest.map(word => control(word, [icon(word.endsWith("+") ? "ccw" : "cw"), el("span", {}, texts.jog.signed(word))], "turn"))),
     ];
   };
 

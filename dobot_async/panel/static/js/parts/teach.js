@@ -24,8 +24,8 @@ export function teachPart(app) {
   const open = button(teach.load, () => chosen.click());
   const check = (input, label) => el("div.field.check", {}, input, el("label", { for: input.id }, label));
   const taking = el("fieldset.gate", {}, el("div.row", {}, take, mode));
-  const playing = el("fieldset.gate", {}, el("div.grid", {}, speed.row, loops.row), check(forever, teach.forever), check(reverse, teach.reverse), play, el("div.actions", {}, open, clear));
-  const element = el("section.card.teach", { "aria-labelledby": "teach-title" }, el("h2", { id: "teach-title" }, teach.title), taking, list, problems, playing, el("div.actions.files", {}, json, playback), chosen);
+  const playing = el("fieldset.gate", {}, el("div.grid", {}, speed.row, loops.row), check(forever, teach.forever), check(reverse, teach.reverse), play, el("div.actions", {}, open, clear, chosen));
+  const element = el("section.card.teach", { "aria-labelledby": "teach-title" }, el("h2", { id: "teach-title" }, teach.title), taking, list, problems, playing, el("div.actions.files", {}, json, playback));
 
   const start = () => {
     const [percent, times] = [speed.value(), loops.value()];
