@@ -91,6 +91,7 @@ class Station:
         self._view: ArmView | None = None
         self._gone = asyncio.Event()
         self._closed = asyncio.Event()
+        self._there = asyncio.Event()
         self._darkening: asyncio.Task[None] | None = None
         self._stops: set[asyncio.Task[None]] = set()
         self._watch = Watch(self)
@@ -198,6 +199,9 @@ class Station:
 
         await asyncio.shield(stopping)
         view.tools.stopped()
+        self._wrote = True
+        if self.lease.holder is None:
+            self._give_back()
 
     def arm_laser(self, seconds: float) -> None:
         """Allow the laser for some seconds; it goes off when they are over."""
@@ -224,6 +228,7 @@ class Station:
     async def _serve(self, arm: Any) -> None:
         """Work with a connected arm until it is lost, or not wanted any more."""
         self._view = view_of(arm)
+        self._there.set()
         self._wrote = False
         arm.link.on_lost.add(self._lost)
         watching = asyncio.create_task(self._watch.run(self._view), name=f"dobot_async panel watch of {self.name}")
@@ -242,6 +247,7 @@ class Station:
                 await cancel_and_join(task)
 
             self._view = None
+            self._there.clear()
             self._told(self)
 
     def _lost(self, error: Exception) -> None:
@@ -253,6 +259,10 @@ class Station:
 
         Behind a bridge this takes the bridge's lease, or raises if another program has it.
         """
+        with suppress(TimeoutError):
+            async with asyncio.timeout(RETRY):  # it may be connected anew just now
+                await self._there.wait()
+
         view = self.view
         if not self.source.owned:
             return
@@ -283,8 +293,12 @@ class Station:
                 await view.end_jogs()
 
         self._watch.tools_changed()
+        self._give_back()
+
+    def _give_back(self) -> None:
+        """Let a bridge give the arm to others: it does when the connection ends that has written something."""
         if self.source.owned and self._wrote and urlsplit(self.source.url).scheme in SHARED:
-            self._gone.set()  # its bridge gives the arm to others when the connection ends
+            self._gone.set()
 
     async def _darken(self, view: ArmView) -> None:
         """Switch the laser off when its time is over."""

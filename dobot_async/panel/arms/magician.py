@@ -14,6 +14,7 @@ from dobot_async.panel.arms.base import ArmView, Part, Point
 __all__ = ["MagicianView"]
 
 FOOT = -138.0  # the table
+ANSWERS = 1.5  # seconds
 TOOLS: Mapping[str, c.EndEffectorParams] = {
     "suction": SuctionCup(),
     "gripper": Gripper(),
@@ -79,7 +80,12 @@ class MagicianView(ArmView):
         return [*((out * cos, out * sin, up) for out, up in ways), (tool.x, tool.y, tool.z)]
 
     async def begin(self) -> None:
-        """Empty the arm's own queue, and let it run."""
+        """Empty the arm's own queue, and let it run.
+
+        The first request has a time: behind a bridge that gives the arm to another program it is not answered, and must
+        not be repeated until the arm is free.
+        """
+        await self.arm.request(c.SET_QUEUED_CMD_CLEAR, None, timeout=ANSWERS)
         await self.arm.queue.clear()
 
     async def move_to(self, place: Mapping[str, float], *, line: bool) -> None:
