@@ -213,6 +213,21 @@ class Stage:
         before = self.where()
         await until(lambda: distance(self.where(), before) > 0.3, "the arm does not move")
 
+    async def lead(self, shown: Shown, grip: tuple[float, float], to: tuple[float, float]) -> None:
+        """Press at a place, drag to another one until the arm follows, and go on holding; see `hold`."""
+        before = self.where()
+        for _ in range(8):
+            await shown.page.mouse.move(*grip)
+            await shown.page.mouse.down()
+            with suppress(AssertionError):
+                await expect(shown.page.get_by_text("Following", exact=True)).to_be_visible(timeout=6000)
+                await shown.page.mouse.move(*to, steps=5)
+                return await until(lambda: distance(self.where(), before) > 2.0, "the arm does not follow", 4.0)
+
+            await shown.page.mouse.up()
+
+        raise AssertionError("the arm does not follow")
+
     async def stands(self) -> None:
         """Return once the arm stands, with no alarm: it was stopped, and did not run into a limit."""
         seen = [self.where()]

@@ -37,8 +37,9 @@ export function teachPart(app) {
     chosen.value = "";
     if (!file) return;
     try {
-      const { steps, remarks = [] } = await upload(`/recordings/${encodeURIComponent(app.selected)}`, { name: file.name }, file);
-      toast([teach.loaded(steps), ...remarks].join(" "));
+      const read = await upload(`/recordings/${encodeURIComponent(app.selected)}`, { name: file.name }, file);
+      const { ok } = await app.act("teach_load", { file: read.file });
+      if (ok) toast([teach.loaded(read.steps), ...(read.remarks ?? [])].join(" "));
     } catch (error) {
       app.complain(error);
     }
