@@ -15,7 +15,7 @@ from dobot_async.fleet.member import Member
 from dobot_async.panel import Panel, Role, panel
 from dobot_async.panel.desk import Desk
 from dobot_async.panel.session import Session
-from dobot_async.panel.start import sources_of
+from dobot_async.panel.sources import sources_of
 from dobot_async.simulator import Simulation, simulate
 
 __all__ = ["IN_TIME", "Page", "Seen", "Shown", "VirtualPage", "browser", "desk_of", "page", "shown", "until"]

@@ -6,7 +6,7 @@ import io
 import os
 import secrets
 import sys
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncGenerator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -112,7 +112,7 @@ def cell_of(file: Text) -> Any:
 
 
 @asynccontextmanager
-async def connected(session: Session, arms: Any) -> AsyncIterator[tuple[Any, Any]]:
+async def connected(session: Session, arms: Any) -> AsyncGenerator[tuple[Any, Any], None]:
     """Yield what a panel is given, and the scene; a cell is connected as a whole."""
     from dobot_async.fleet import Fleet
     from dobot_async.fleet.cell import Cell

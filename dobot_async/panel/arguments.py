@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from typing import Any
+from typing import Any, TypeGuard, cast
 
 __all__ = ["Arguments"]
 
@@ -48,7 +48,7 @@ class Arguments:
         if value is None and optional:
             return None
 
-        if not isinstance(value, list) or len(value) not in count:
+        if not is_list(value) or len(value) not in count:
             raise ValueError(f"{name} must be a list of {' or '.join(map(str, count))} numbers")
 
         return [number(f"each of {name}", each, -math.inf, math.inf) for each in value]
@@ -83,7 +83,7 @@ class Arguments:
         if not isinstance(value, dict):
             raise ValueError(f"{name} must be an object")  # noqa: TRY004 - it is not the caller's type, but a page's
 
-        return {str(key): each for key, each in value.items()}
+        return cast("dict[str, Any]", value)
 
     def has(self, name: str) -> bool:
         """Return whether something was given."""
@@ -93,6 +93,11 @@ class Arguments:
         """Raise ValueError for what nobody has asked for."""
         if self._given:
             raise ValueError(f"there is no {', '.join(sorted(map(repr, self._given)))} here")
+
+
+def is_list(value: object) -> TypeGuard[list[Any]]:
+    """Whether it is a list."""
+    return isinstance(value, list)
 
 
 def number(name: str, value: Any, least: float, most: float) -> float:

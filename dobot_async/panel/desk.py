@@ -16,7 +16,8 @@ from dobot_async.panel.holding import BEAT, PATIENCE, Ticks
 from dobot_async.panel.messages import Hub, as_json
 from dobot_async.panel.problems import Refusal
 from dobot_async.panel.session import Session
-from dobot_async.panel.station import Source, Station
+from dobot_async.panel.sources import Source
+from dobot_async.panel.station import Station
 
 __all__ = ["Desk"]
 

@@ -12,8 +12,8 @@ import asyncio
 import json
 import math
 from collections import deque
-from collections.abc import Hashable, Mapping
-from typing import Any
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any, cast
 
 from dobot_async.events import Events
 
@@ -29,10 +29,10 @@ def finite(value: Any) -> Any:
         return round(value, 4) if math.isfinite(value) else None
 
     if isinstance(value, Mapping):
-        return {name: finite(each) for name, each in value.items()}
+        return {name: finite(each) for name, each in cast("Mapping[str, Any]", value).items()}
 
     if isinstance(value, (list, tuple)):
-        return [finite(each) for each in value]
+        return [finite(each) for each in cast("Sequence[Any]", value)]
 
     return value
 

@@ -10,13 +10,14 @@ import asyncio
 import json
 import logging
 from collections.abc import Coroutine
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard, cast
 
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.bridge.limits import Allowance
 from dobot_async.panel.access import Role
-from dobot_async.panel.actions import ACTIONS, Call
+from dobot_async.panel.actions import ACTIONS
 from dobot_async.panel.arguments import Arguments
+from dobot_async.panel.calls import Call
 from dobot_async.panel.messages import Outlet, as_json
 from dobot_async.panel.problems import Refusal, told
 
@@ -131,7 +132,7 @@ class Session:
 
         call = Call(self, station, Arguments(message), number)
         found = action.run(call)
-        if isinstance(found, Coroutine):
+        if is_coroutine(found):
             self._spawn(number, found)
         else:
             self._reply(number, value=found)
@@ -164,6 +165,11 @@ class Session:
             self.tell("reply", id=number, ok=True, value=value)
 
 
+def is_coroutine(found: object) -> TypeGuard[Coroutine[Any, Any, Any]]:
+    """Whether it is to be awaited."""
+    return isinstance(found, Coroutine)
+
+
 def refuse(word: str) -> None:
     """What JSON has no word for."""
     raise ValueError(word)
@@ -179,4 +185,4 @@ def parsed(text: str) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise ValueError("a message is a JSON object")  # noqa: TRY004 - it is not the caller's type, but a page's
 
-    return {str(key): value for key, value in found.items()}
+    return cast("dict[str, Any]", found)

@@ -6,17 +6,15 @@ panel(arm | fleet | members) --> Sources --> Desk (stations, sessions) --> Web -
 from __future__ import annotations
 
 import asyncio
-import math
 import secrets
 import socket
-from collections.abc import AsyncIterator, Collection, Mapping
+from collections.abc import AsyncGenerator, Collection, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
-from dobot_async import Arm, Box, ConnectFailed, Cylinder, Fleet
+from dobot_async import Arm, ConnectFailed, Fleet
 from dobot_async._core.util.tasks import cancel_and_join, run_shielded
 from dobot_async.bridge.doors import served_with
 from dobot_async.bridge.handshake import HANDSHAKE
@@ -26,9 +24,8 @@ from dobot_async.panel.access import Access, Role, is_loopback
 from dobot_async.panel.desk import Desk
 from dobot_async.panel.lease import Lease
 from dobot_async.panel.scenery import show_scene
-from dobot_async.panel.station import Source
+from dobot_async.panel.sources import sources_of
 from dobot_async.simulator.scene import Scene
-from dobot_async.transports import SCHEMES, hidden
 
 __all__ = ["Panel", "panel"]
 
@@ -99,7 +96,7 @@ class Panel:
         return holder.name if holder else None
 
     @asynccontextmanager
-    async def reserved(self, name: str | None = None, *, takeover: bool = False) -> AsyncIterator[None]:
+    async def reserved(self, name: str | None = None, *, takeover: bool = False) -> AsyncGenerator[None, None]:
         """Keep an arm for the program for the length of a block: no page moves it, and all see that.
 
         Every page can still stop it.
@@ -154,7 +151,7 @@ async def panel(
     certificate: str | Path | None = None,
     key: str | Path | None = None,
     scene: Scene | None = None,
-) -> AsyncIterator[Panel]:
+) -> AsyncGenerator[Panel, None]:
     """Show arms in browsers, and let operators move them, for the length of a block.
 
     Args:
@@ -240,77 +237,3 @@ def listening(host: str, port: int) -> socket.socket:
         return socket.create_server((host, port), family=family, backlog=64)
     except (OSError, OverflowError) as error:
         raise ConnectFailed(f"cannot listen at {host}, port {port}: {error}") from error
-
-
-def sources_of(arms: Any) -> tuple[dict[str, Source], list[dict[str, Any]], Fleet[Any] | None]:
-    """Return how each arm is reached, the zones of the cell, and its fleet."""
-    if isinstance(arms, Fleet):
-        zones = [zone(name, shape) for name, shape in arms.zones.items()]
-        return {name: of_fleet(arms, name) for name in arms}, zones, arms
-
-    named = dict(arms) if isinstance(arms, Mapping) else {"arm": arms}
-    if not named:
-        raise ValueError("a panel has at least one arm")
-
-    sources = {name: of_member(each) if isinstance(each, Member) else of_arm(each) for name, each in named.items()}
-    return sources, [], None
-
-
-@asynccontextmanager
-async def lent(arm: Any) -> AsyncIterator[Any]:
-    """Use an arm that belongs to somebody else."""
-    yield arm
-
-
-def of_arm(arm: Any) -> Source:
-    """A connected arm."""
-    if not hasattr(arm, "link"):
-        raise TypeError(f"expected a connected arm, a fleet, or Members by name, not {arm!r}")
-
-    return Source(partial(lent, arm), arm.link.url, owned=False)
-
-
-def of_fleet(fleet: Fleet[Any], name: str) -> Source:
-    """An arm of a fleet."""
-    member, arm = fleet.member(name), fleet[name]
-    base = member.base
-    return Source(
-        partial(lent, arm),
-        member.url,
-        owned=False,
-        base=(base.x, base.y, base.z, base.yaw),
-        limits=member.limits,
-        recover=fleet.recover,
-    )
-
-
-def of_member(member: Member[Any]) -> Source:
-    """An arm that is to be connected.
-
-    Nothing of its queue is touched until somebody takes its lease, and a link that ends in good order leaves it as it
-    is: the panel itself stops what it has begun.
-    """
-    if urlsplit(member.url).scheme not in SCHEMES:
-        forms = "; ".join(form for _, form in SCHEMES.values())
-        raise ValueError(f"{hidden(member.url)!r} has no scheme that leads to an arm; use one of: {forms}")
-
-    options = {"queue": "keep", "on_error": "leave", **member.options}
-    base = member.base
-    connect = partial(member.kind.connect, member.url, **options)
-    return Source(connect, member.url, owned=True, base=(base.x, base.y, base.z, base.yaw), limits=member.limits)
-
-
-def zone(name: str, shape: Box | Cylinder | None) -> dict[str, Any]:
-    """A zone as pages are told of it; what has no end is null."""
-    if shape is None:
-        return {"name": name, "kind": "name"}
-
-    if isinstance(shape, Box):
-        return {"name": name, "kind": "box", "x": edges(shape.x), "y": edges(shape.y), "z": edges(shape.z)}
-
-    return {"name": name, "kind": "cylinder", "x": shape.x, "y": shape.y, "radius": shape.radius, "z": edges(shape.z)}
-
-
-def edges(span: tuple[float, float]) -> list[Edge]:
-    """The ends of a range."""
-    return [each if math.isfinite(each) else None for each in span]

@@ -13,9 +13,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable, Coroutine
-from contextlib import AbstractAsyncContextManager, suppress
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -28,38 +27,18 @@ from dobot_async.panel.holding import Hold
 from dobot_async.panel.lease import Lease, Party
 from dobot_async.panel.messages import Hub
 from dobot_async.panel.problems import Refusal
+from dobot_async.panel.sources import Source
 from dobot_async.panel.taught import Taught
 from dobot_async.panel.watching import Watch
 from dobot_async.panel.works import Work, Works
 
-__all__ = ["Source", "Station"]
+__all__ = ["Station"]
 
 logger = logging.getLogger("dobot_async.panel")
 RETRY = 2.0  # seconds until an arm that did not answer is tried again
 QUICKLY = 2.0  # seconds for what is put in order when a lease ends
 SHARED = ("tcp", "ws", "wss", "zenoh")
 """Ways that may lead to a bridge, whose lease lasts as long as the connection: it is given back with the panel's."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """How an arm is reached.
-
-    Attributes:
-        connect: Connects it, or lends the one that there is, for the length of a block.
-        url: Where it is.
-        owned: The panel has connected it, and may connect it anew.
-        base: Where it stands in its cell: x, y, z and yaw.
-        limits: Where in the cell its tool may be; None leaves it to the arm.
-        recover: Makes it ready again, if that is more than its own.
-    """
-
-    connect: Callable[[], AbstractAsyncContextManager[Any]]
-    url: str
-    owned: bool
-    base: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    limits: Any = None
-    recover: Callable[[], Coroutine[Any, Any, None]] | None = None
 
 
 class Station:

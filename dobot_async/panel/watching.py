@@ -123,6 +123,7 @@ class Watch:
                 "name": str(getattr(each, "name", type(each).__name__)),
                 "cause": str(getattr(each, "cause", each)),
                 "remedy": str(getattr(each, "remedy", "")),
+                "harmless": view.is_harmless(each),
             }
             for each in alarms
         ]

@@ -8,11 +8,9 @@ What is refused is a short text, or JSON where the page asked; nothing that stra
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
 
 from aiohttp import WSMsgType, web
 
@@ -20,10 +18,11 @@ from dobot_async._core.util.tasks import cancel_and_join, run_shielded
 from dobot_async._core.util.text import printable
 from dobot_async.bridge.limits import Allowance
 from dobot_async.panel.access import HEADERS, Access, Role, TurnedAway
+from dobot_async.panel.answers import as_json, plain, safe, served
 from dobot_async.panel.desk import Desk
 from dobot_async.panel.doorkeeper import Doorkeeper
 from dobot_async.panel.drawings import MODES
-from dobot_async.panel.pages import Page, Pages
+from dobot_async.panel.pages import Pages
 from dobot_async.panel.problems import Refusal, told
 from dobot_async.panel.session import Session
 
@@ -39,7 +38,10 @@ UPLOADS, UPLOAD_BURST = 10 / 60, 10.0  # a second, and at once
 PINGS = 10 / 3  # seconds; one that is not answered half of that later ends the connection
 TOLD, TOLD_BURST = 0.5, 40.0  # lines of the log that strangers can cause, a second and at once
 STATUS = {"rate": 429, "busy": 429, "role": 403, "lease": 403, "link": 503}
-WELCOME = '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0;url=/"><title>Panel</title>'
+WELCOME = (
+    '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0;url=/">'
+    '<link rel="icon" href="data:,"><title>Panel</title>'
+)
 NOT_IN = (
     "This panel wants to know you: open the address that was shown where it was started, with its token, or the QR "
     "code."
@@ -277,33 +279,3 @@ async def pump(session: Session, socket: web.WebSocketResponse) -> None:
         return
 
     await socket.close(code=1001, message=b"the panel leaves this page")
-
-
-def served(page: Page | None, request: web.Request) -> web.Response:
-    """Answer with a file."""
-    if page is None:
-        raise web.HTTPNotFound
-
-    headers = {"ETag": page.tag, "Cache-Control": "no-cache", "Content-Type": page.kind, "Vary": "Accept-Encoding"}
-    if request.headers.get("If-None-Match") == page.tag:
-        return web.Response(status=304, headers=headers)
-
-    if page.packed and "gzip" in request.headers.get("Accept-Encoding", ""):
-        return web.Response(body=page.packed, headers=headers | {"Content-Encoding": "gzip"})
-
-    return web.Response(body=page.data, headers=headers)
-
-
-def plain(status: int, text: str) -> web.Response:
-    """Answer in words."""
-    return web.Response(status=status, text=text, content_type="text/plain")
-
-
-def as_json(value: Any, status: int = 200) -> web.Response:
-    """Answer in JSON."""
-    return web.Response(status=status, text=json.dumps(value), content_type="application/json")
-
-
-def safe(name: str) -> str:
-    """Return a name that a file may have."""
-    return "".join(each if each.isascii() and (each.isalnum() or each in "-_") else "_" for each in name) or "recording"

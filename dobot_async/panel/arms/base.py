@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -176,6 +176,10 @@ class ArmView(ABC):
 
         return True
 
+    def is_harmless(self, alarm: object) -> bool:  # noqa: ARG002 - most arms tell nothing else
+        """Return whether an alarm keeps the arm from nothing."""
+        return False
+
     async def begin(self) -> None:  # noqa: B027 - most arms have no queue of their own
         """Let nothing that an earlier program has left in the arm's own queue begin to move."""
 
@@ -198,7 +202,7 @@ class ArmView(ABC):
             await self.arm.move_by(**{found["axis"]: way})
 
     @asynccontextmanager
-    async def jogging(self, direction: str, percent: float) -> AsyncIterator[None]:
+    async def jogging(self, direction: str, percent: float) -> AsyncGenerator[None, None]:
         """Jog until the block ends, at so many percent of the arm's speed of jogs.
 
         The speed is set once, and set back by `end_jogs`: between a press and the motion there is no time for it.

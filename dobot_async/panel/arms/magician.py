@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from dobot_async import Gripper, Jog, Laser, Magician, Pen, PTPMode, SuctionCup
 from dobot_async.magician import commands as c
+from dobot_async.magician.alarms import IGNORED
 from dobot_async.magician.kinematics import FOREARM, REAR_ARM
 from dobot_async.panel.arms.base import ArmView, Part, Point
 
@@ -78,6 +79,10 @@ class MagicianView(ArmView):
         ways = ((0.0, FOOT), (0.0, 0.0), (elbow_out, elbow_up), (wrist_out, wrist_up))
         tool = kinematics.forward(joints[0], joints[1], joints[2], joints[3])
         return [*((out * cos, out * sin, up) for out, up in ways), (tool.x, tool.y, tool.z)]
+
+    def is_harmless(self, alarm: object) -> bool:
+        """As that which every power-up sets."""
+        return getattr(alarm, "code", None) in IGNORED
 
     async def begin(self) -> None:
         """Empty the arm's own queue, and let it run.
