@@ -1,4 +1,4 @@
-"""What the tests of the page share: a simulated arm, a panel, a line that can be cut, and pages on a phone and a desktop.
+"""What the tests of the page share: a simulated arm, a panel, a line that can be cut, pages on a phone and a desktop.
 
 What the arm recorded decides: `Stage.sim`. Each page keeps what its console said and which addresses it asked for.
 """
@@ -6,9 +6,10 @@ What the arm recorded decides: `Stage.sim`. Each page keeps what its console sai
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 import re
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,12 +25,17 @@ from dobot_async.simulator.scene import Belt, Block, Piece, Scene
 
 __all__ = ["DESKTOP", "PHONE", "Cut", "Shown", "Stage", "stage", "until"]
 
+logger = logging.getLogger(__name__)
 IN_TIME = 20.0  # seconds for what takes far less: the machine may be busy
 PHONE: dict[str, Any] = {
-    "viewport": {"width": 412, "height": 915}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2.0,
+    "viewport": {"width": 412, "height": 915},
+    "has_touch": True,
+    "is_mobile": True,
+    "device_scale_factor": 2.0,
 }
 DESKTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
 SCREENSHOTS = os.environ.get("DOBOT_SCREENSHOTS", "")
+SAID = "[...document.querySelectorAll('#toasts, .banners, .log')].map(each => each.innerText).join(' | ')"
 EXPECTED = re.compile(r"GPU stall due to ReadPixels|WebGL-0x|Automatic fallback to software WebGL")
 
 
@@ -37,7 +43,7 @@ async def until(true: Callable[[], object], what: str, seconds: float = IN_TIME)
     """Return once something is so; fail if it is not in time."""
     try:
         async with asyncio.timeout(seconds):
-            while not true():
+            while not true():  # noqa: ASYNC110 - the simulated arm has no event for where it is
                 await asyncio.sleep(0.02)
     except TimeoutError:
         raise AssertionError(what) from None
@@ -99,7 +105,6 @@ class Shown:
         context: Its browser profile.
         console: Errors and warnings of its console.
         asked: The addresses that it asked for.
-        bytes: What it loaded, as sent.
     """
 
     page: Page
@@ -144,9 +149,7 @@ class Shown:
     async def picture(self, name: str) -> None:
         """Keep a screenshot, where they are wanted."""
         if SCREENSHOTS:
-            folder = Path(SCREENSHOTS)
-            folder.mkdir(parents=True, exist_ok=True)
-            await self.page.screenshot(path=folder / f"{name}.png")
+            await self.page.screenshot(path=Path(SCREENSHOTS) / f"{name}.png")
 
     def check(self) -> None:
         """Nothing went wrong, and nobody else was asked."""
@@ -166,7 +169,9 @@ class Stage:
     cut: Cut
     shown: list[Shown] = field(default_factory=list)
 
-    async def open(self, device: dict[str, Any] = PHONE, *, viewer: bool = False, script: str = "", **options: Any) -> Shown:
+    async def open(
+        self, device: dict[str, Any] = PHONE, *, viewer: bool = False, script: str = "", **options: Any
+    ) -> Shown:
         """Open the panel on a device, and wait until it has the arm.
 
         Args:
@@ -185,7 +190,7 @@ class Stage:
         url = urlsplit(self.panel.viewer_url if viewer else self.panel.operator_url)
         await shown.page.goto(url._replace(netloc=f"127.0.0.1:{self.cut.port}").geturl())
         await shown.page.wait_for_selector('.dot[data-state="open"]', state="attached", timeout=IN_TIME * 1000)
-        await expect(shown.page.locator(".numbers dd").first).not_to_have_text("–", timeout=IN_TIME * 1000)
+        await expect(shown.page.locator(".numbers dd").first).not_to_have_text("\u2013", timeout=IN_TIME * 1000)
         return shown
 
     def where(self) -> tuple[float, float, float]:
@@ -242,9 +247,9 @@ class Stage:
     async def close(self) -> None:
         """Close all pages; what they say at last is shown with a test that failed."""
         for number, shown in enumerate(self.shown):
-            with suppress(Error):
-                said = "[...document.querySelectorAll('#toasts, .banners, .log')].map(each => each.innerText).join('\\n')"
-                print(f"page {number}:", await asyncio.wait_for(shown.page.evaluate(said), 2.0), *shown.console, sep="\n")
+            with suppress(Error, TimeoutError):
+                said = await asyncio.wait_for(shown.page.evaluate(SAID), 2.0)
+                logger.info("page %d: %s %s", number, said, shown.console)
 
             with suppress(Error):
                 await shown.context.close()

@@ -7,6 +7,11 @@ import asyncio
 from panel_stage import DESKTOP, PHONE, Stage, distance, until
 from playwright.async_api import expect
 
+DEAF = """
+for (const type of ["pointerup", "pointercancel", "lostpointercapture"])
+    window.addEventListener(type, event => event.stopImmediatePropagation(), true);
+"""
+
 
 async def test_it_moves_while_a_button_is_held_and_stands_when_it_is_let_go(magician: Stage) -> None:
     phone = await magician.open(PHONE)
@@ -67,11 +72,10 @@ async def test_a_network_that_is_cut_while_holding_stops_it(magician: Stage) -> 
 
 
 async def test_a_release_that_is_never_heard_does_not_keep_it_going(magician: Stage) -> None:
-    """The finger is lifted while the page cannot see it: the pointer is not captured any more, so there are no beats."""
+    """The finger is lifted where the page cannot see it: it does not capture the pointer any more, so no beats."""
     phone = await magician.open(PHONE)
     await phone.take_control()
-    silence = "for (const type of ['pointerup', 'pointercancel', 'lostpointercapture']) window.addEventListener(type, event => event.stopImmediatePropagation(), true)"
-    await phone.page.evaluate(silence)
+    await phone.page.evaluate(DEAF)
     await magician.hold(phone, "Jog y+")
     await phone.page.mouse.up()
     await expect(phone.page.get_by_text("lost sight of the button")).to_be_visible()

@@ -8,6 +8,30 @@ from playwright.async_api import expect
 from dobot_async.magician import commands as c
 
 EVIL = "<!doctype html><title>another page</title>"
+TRIES = """() => new Promise(resolve => {
+    const socket = new WebSocket(`ws://${location.host}/ws`), answers = [];
+    const values = { x: 200, direction: "y+", press: 1, tick: 1, on: true };
+    const tries = ["take_lease", "home", "move_to", "jog", "teach_take", "suction"];
+    socket.onmessage = ({ data }) => {
+        const message = JSON.parse(data);
+        if (message.type === "hello") {
+            const arm = message.arms[0].name;
+            tries.forEach((what, id) => socket.send(JSON.stringify({ id, do: what, arm, ...values })));
+        }
+        if (message.type === "reply") answers.push([message.ok, message.error?.kind]);
+        if (answers.length === tries.length) resolve(answers);
+    };
+})"""
+ATTACK = """async address => {
+    const socket = await new Promise(resolve => {
+        const made = new WebSocket(`ws://${address}/ws`);
+        made.onmessage = () => resolve("let in");
+        made.onclose = () => resolve("refused");
+    });
+    const ask = (path, options) => fetch(`http://${address}${path}`, { credentials: "include", ...options })
+        .then(answer => answer.status, () => "blocked");
+    return [socket, await ask("/files?arm=arm&name=a.svg", { method: "POST", body: "<svg/>" }), await ask("/")];
+}"""
 
 
 async def test_a_second_operator_takes_over_in_sight_of_the_first(magician: Stage) -> None:
@@ -27,7 +51,7 @@ async def test_a_second_operator_takes_over_in_sight_of_the_first(magician: Stag
     await expect(first.page.get_by_role("button", name="Jog y+", exact=True)).to_be_disabled()
     await expect(second.page.get_by_role("button", name="Jog y+", exact=True)).to_be_enabled()
     await first.page.mouse.up()
-    await magician.hold(second, "Jog y−")
+    await magician.hold(second, "Jog y\u2212")
     await second.page.mouse.up()
     await magician.stands()
 
@@ -73,17 +97,7 @@ async def test_a_viewer_sees_all_moves_nothing_and_stops(magician: Stage) -> Non
 async def test_a_viewer_that_makes_the_page_try_moves_nothing(magician: Stage) -> None:
     viewer = await magician.open(PHONE, viewer=True)
     before = len(magician.sim.arm.executed)
-    answers = await viewer.page.evaluate(
-        """() => new Promise(resolve => {
-            const socket = new WebSocket(`ws://${location.host}/ws`), answers = [];
-            socket.onmessage = ({ data }) => {
-                const message = JSON.parse(data);
-                if (message.type === "hello") ["take_lease", "home", "move_to", "jog", "teach_take", "suction"].forEach((what, id) =>
-                    socket.send(JSON.stringify({ id, do: what, arm: message.arms[0].name, x: 200, direction: "y+", press: 1, tick: 1, on: true })));
-                if (message.type === "reply" && answers.push([message.ok, message.error?.kind]) === 6) resolve(answers);
-            };
-        })"""
-    )
+    answers = await viewer.page.evaluate(TRIES)
     assert answers == [[False, "role"]] * 6
     assert len(magician.sim.arm.executed) == before
     assert magician.panel.holder() is None
@@ -96,20 +110,7 @@ async def test_a_page_of_another_origin_gets_nowhere(magician: Stage) -> None:
     await strange.route("http://evil.example/**", lambda route: route.fulfill(body=EVIL, content_type="text/html"))
     await strange.goto("http://evil.example/")
     address = f"127.0.0.1:{magician.cut.port}"
-    outcome = await strange.evaluate(
-        """async address => {
-            const socket = await new Promise(resolve => {
-                const made = new WebSocket(`ws://${address}/ws`);
-                made.onmessage = () => resolve("let in");
-                made.onclose = () => resolve("refused");
-            });
-            const posted = await fetch(`http://${address}/files?arm=arm&name=a.svg`, { method: "POST", body: "<svg/>", credentials: "include" })
-                .then(answer => answer.status, () => "blocked");
-            const read = await fetch(`http://${address}/`, { credentials: "include" }).then(answer => answer.status, () => "blocked");
-            return [socket, posted, read];
-        }""",
-        address,
-    )
+    outcome = await strange.evaluate(ATTACK, address)
     assert outcome[0] == "refused"
     assert outcome[1] in {"blocked", 403}
     assert outcome[2] in {"blocked", 403}

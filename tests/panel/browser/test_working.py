@@ -102,10 +102,13 @@ async def test_a_recording_is_saved_and_loaded(magician: Stage) -> None:
     assert len(recording["steps"]) == 1
     await desktop.page.get_by_role("button", name="Remove: Point 1").click()
     await expect(desktop.page.get_by_text("No points yet")).to_be_visible()
-    await desktop.page.set_input_files(".teach input[type=file]", {"name": "kept.json", "mimeType": "application/json", "buffer": kept.read_bytes()})
+    await desktop.page.set_input_files(
+        ".teach input[type=file]", {"name": "kept.json", "mimeType": "application/json", "buffer": kept.read_bytes()}
+    )
     await expect(desktop.page.locator(".steps li")).to_contain_text("Point 1")
-    bad = {"name": "bad.json", "mimeType": "application/json", "buffer": b"no recording"}
-    await desktop.page.set_input_files(".teach input[type=file]", bad)
+    await desktop.page.set_input_files(
+        ".teach input[type=file]", {"name": "bad.json", "mimeType": "application/json", "buffer": b"no recording"}
+    )
     await expect(desktop.page.locator(".toast.error")).to_be_visible()
     await expect(desktop.page.locator(".steps li")).to_contain_text("Point 1")
 
@@ -146,7 +149,11 @@ async def test_a_drawing_is_placed_by_dragging_and_drawn(magician: Stage) -> Non
     await start.click()
 
     def drawn() -> list[tuple[float, float]]:
-        return [(each.value.x, each.value.y) for each in magician.sim.arm.executed if each.command is c.SET_CP_CMD and each.value.z < 1.0]
+        return [
+            (each.value.x, each.value.y)
+            for each in magician.sim.arm.executed
+            if each.command is c.SET_CP_CMD and each.value.z < 1.0
+        ]
 
     await until(drawn, "nothing is drawn")
     await desktop.picture("desktop-drawing")
@@ -162,7 +169,9 @@ async def test_a_drawing_is_placed_by_dragging_and_drawn(magician: Stage) -> Non
 async def test_a_file_that_is_no_drawing_is_a_message(magician: Stage) -> None:
     desktop = await magician.open(DESKTOP)
     await desktop.take_control()
-    await desktop.page.set_input_files("#draw-file", {"name": "bad.svg", "mimeType": "image/svg+xml", "buffer": b"<svg"})
+    await desktop.page.set_input_files(
+        "#draw-file", {"name": "bad.svg", "mimeType": "image/svg+xml", "buffer": b"<svg"}
+    )
     await expect(desktop.page.locator(".toast.error")).to_contain_text("bad.svg")
 
 
@@ -198,7 +207,8 @@ async def test_the_tool_is_dragged_in_the_picture(magician: Stage) -> None:
             const { data, width, height } = pen.getImageData(0, 0, canvas.width, canvas.height);
             const wanted = getComputedStyle(document.documentElement).getPropertyValue("--view-target").trim();
             const [r, g, b] = [1, 3, 5].map(at => parseInt(wanted.slice(at, at + 2), 16));
-            const half = canvas.clientWidth > 1.2 * canvas.clientHeight ? [0.58 * width, height] : [width, 0.58 * height];
+            const wide = canvas.clientWidth > 1.2 * canvas.clientHeight;
+            const half = wide ? [0.58 * width, height] : [width, 0.58 * height];
             let [x, y, count] = [0, 0, 0];
             for (let row = 0; row < half[1]; row++) for (let column = 0; column < half[0]; column++) {
                 const at = 4 * (row * width + column);
@@ -246,7 +256,10 @@ async def test_suction_and_a_laser_that_one_tap_does_not_switch_on(magician: Sta
     await suction.click()
     await expect(suction).to_have_attribute("aria-checked", "true")
     await until(lambda: magician.sim.arm.suction, "the pump is not on")
-    laser, arming = desktop.page.get_by_role("switch", name="Laser on"), desktop.page.get_by_role("button", name="Hold to arm")
+    laser, arming = (
+        desktop.page.get_by_role("switch", name="Laser on"),
+        desktop.page.get_by_role("button", name="Hold to arm"),
+    )
     await expect(laser).to_be_disabled()
     await arming.click()
     await expect(laser).to_be_disabled()

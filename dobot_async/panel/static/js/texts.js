@@ -50,7 +50,7 @@ export const texts = {
   pose: { label: "Pose", joints: "Joints", moving: "moving", rests: "at rest", unknown: "no reading yet" },
   alarms: { title: "Alarm", remedy: "What to do", recover: "Recover", recovering: "Recovering …" },
   home: { label: "Home", busy: "Homing …" },
-  pause: "Pause", resume: "Resume", power: "Power on",
+  pause: "Pause", resume: "Resume", power: "Power",
   jog: {
     title: "Jog", frame: "Frame", tool: "Tool", joint: "Joints", step: "Step size", hold: "Hold",
     holdHint: "Hold a button to move; let go to stop.", stepHint: "Each press moves one step.",

@@ -27,12 +27,11 @@ export function banners(app) {
     el("h2", {}, inWords(name)), cause && el("p", {}, cause), remedy && el("p", {}, el("strong", {}, `${texts.alarms.remedy}: `), remedy));
 
   const showAlarms = () => {
-    const found = app.arm?.alarms ?? [];
-    const bad = found.filter(alarm => !alarm.harmless);
+    const found = (app.arm?.alarms ?? []).filter(alarm => !alarm.harmless);
     const recover = button(texts.alarms.recover, () => app.work(recover, texts.alarms.recovering, "recover"), { class: "primary" });
-    fill(alarms, found.length > 0 && el("section", { class: `banner alarms ${bad.length ? "bad" : ""}`, "aria-label": texts.alarms.title },
-      icon("alarm"), el("div", {}, (bad.length ? bad : found).map(words)),
-      bad.length > 0 && app.arm.can("recover") && el("fieldset.gate", { disabled: !app.mine }, recover)));
+    fill(alarms, found.length > 0 && el("section.banner.bad.alarms", { "aria-label": texts.alarms.title },
+      icon("alarm"), el("div", {}, found.map(words)),
+      app.arm.can("recover") && el("fieldset.gate", { disabled: !app.mine }, recover)));
   };
 
   const showLease = () => {

@@ -31,6 +31,7 @@ export function readout(app) {
     };
     fill(pose, (arm?.info.axes ?? []).map(axis => cell(state => state.pose[axis.name], axis.name)));
     fill(joints, (arm?.info.joints ?? []).map((joint, n) => cell(state => state.joints[n], joint.name)));
+    for (const list of [pose, joints]) list.classList.toggle("many", list.children.length > 4);
     numbers();
   };
 

@@ -78,8 +78,9 @@ export class View2D {
     this.above.pen.fillStyle = this.colors["view-sky"];
     const rest = wide ? [split, 0, width - split, height] : [0, split, width, height - split];
     this.above.pen.fillRect(...rest);
-    this.side.fit(xs, [-180, 420], rest);
-    this.drawSide(xs);
+    const zs = this.heights();
+    this.side.fit(xs, zs, rest);
+    this.drawSide(xs, zs);
     this.above.text(this.hooks.words.top, [8, 18], this.colors["view-ink"]);
     this.above.text(this.hooks.words.side, [rest[0] + 8, rest[1] + 18], this.colors["view-ink"]);
   }
@@ -128,10 +129,15 @@ export class View2D {
     if (this.model.arms.size > 1) above.text(arm.name, [above.px([x, y])[0] + 12, above.px([x, y])[1] - 12], color);
   }
 
-  drawSide(xs) {
+  heights() {
+    const points = [...this.model.arms.values()].flatMap(arm => (arm.state?.points ?? []).map(point => toCell(arm.info.base, point)[2]));
+    return [Math.min(this.model.table ?? 0, 0, ...points) - MARGIN, Math.max(250, ...points) + MARGIN];
+  }
+
+  drawSide(xs, zs) {
     const { side, colors } = this;
     const tables = this.model.table ?? Math.min(0, ...[...this.model.arms.values()].map(arm => arm.state?.points?.[0][2] ?? 0));
-    side.grid(xs, [-180, 420], 100, colors["view-grid"]);
+    side.grid(xs, zs, 100, colors["view-grid"]);
     side.line([[xs[0], tables], [xs[1], tables]], colors["view-ink"], 1.5);
     for (const thing of this.model.things) {
       if (thing.kind === "sensor") continue;

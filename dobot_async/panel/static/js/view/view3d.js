@@ -42,6 +42,7 @@ export class View3D {
     this.watchDrag();
     this.controls = new OrbitControls3(this.camera, this.element);
     this.controls.addEventListener("change", () => this.request());
+    this.controls.addEventListener("start", () => { this.turned = true; });
     this.element.addEventListener("webglcontextlost", event => { event.preventDefault(); hooks.lost?.(); });
     this.sizes = new ResizeObserver(() => this.resize());
     this.sizes.observe(this.element);
@@ -73,9 +74,7 @@ export class View3D {
     for (const zone of this.model.zones) this.scene.add(zoneOf(zone, colors, floor));
     [...this.model.arms.values()].forEach((arm, n) => this.addArm(arm, n));
     this.update();
-    const names = [...this.model.arms.keys()].join();
-    if (this.controls && names !== this.names) this.home();
-    this.names = names;
+    this.framed = "";
   }
 
   addArm(arm, number) {
@@ -103,8 +102,16 @@ export class View3D {
     if (this.level() !== this.floor) return this.rebuild();
     for (const arm of this.model.arms.values()) this.updateArm(arm, this.bodies.get(arm.name));
     this.updateThings();
+    this.frameOnce();
     this.layer("strokes", this.model.strokes, strokes => strokesOf(strokes, this.colors["view-ink"]), strokes => strokes.length);
     return this.request();
+  }
+
+  /** Look at all arms when it is first known where they are. */
+  frameOnce() {
+    const known = [...this.model.arms.values()].filter(arm => arm.state?.points).map(arm => arm.name).join();
+    if (this.controls && this.sized && known !== this.framed && !this.turned) this.home();
+    this.framed = known;
   }
 
   updateArm(arm, { body, trace, target, name }) {
@@ -155,17 +162,29 @@ export class View3D {
     dispose(object);
   }
 
-  /** Look at all arms from the front, a little from the side. */
+  /** Look at all arms from the front, a little from the side, from as far as they need. */
   home() {
-    const places = [...this.model.arms.values()].map(arm => toCell(arm.info.base, [0, 0, 0]));
-    const [xs, ys] = [places.map(place => place[0]), places.map(place => place[1])];
-    const middle = places.length ? [(Math.min(...xs) + Math.max(...xs)) / 2, (Math.min(...ys) + Math.max(...ys)) / 2] : [0, 0];
-    const spread = places.length ? Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys)) : 0;
-    const far = (760 + (0.9 * spread) / Math.max(1, this.camera.aspect)) * Math.max(1, 0.85 / this.camera.aspect);
-    this.controls.target.set(middle[0] + 110, middle[1], this.floor + 120);
-    this.camera.position.set(middle[0] + 110 + 0.68 * far, middle[1] - 0.72 * far, this.floor + 120 + 0.5 * far);
+    const { low, high } = this.extent();
+    const middle = low.map((value, axis) => (value + high[axis]) / 2);
+    const radius = Math.hypot(...low.map((value, axis) => (high[axis] - value) / 2));
+    const narrow = Math.min(1, this.camera.aspect);
+    const far = (0.94 * radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
+    this.controls.target.set(...middle);
+    this.camera.position.set(middle[0] + 0.62 * far, middle[1] - 0.64 * far, middle[2] + 0.45 * far);
     this.controls.update();
     this.request();
+  }
+
+  /** The box around all arms, and some of the table before each. */
+  extent() {
+    const points = [...this.model.arms.values()].flatMap(({ info, state }) =>
+      [[-60, -120, 0], [(info.reach?.outer ?? 250) * 0.8, 120, 0], ...(state?.points ?? [[0, 0, 200]])].map((point, n) => {
+        const [x, y, z] = toCell(info.base, point);
+        return n < 2 ? [x, y, this.floor] : [x, y, z];
+      }));
+    const along = axis => points.map(point => point[axis]);
+    if (!points.length) return { low: [-100, -100, 0], high: [300, 100, 200] };
+    return { low: [0, 1, 2].map(axis => Math.min(...along(axis))), high: [0, 1, 2].map(axis => Math.max(...along(axis))) };
   }
 
   resize() {
