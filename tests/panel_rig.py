@@ -138,9 +138,11 @@ async def shown(
     *, speed: float = 1.0, model: str = "magician", kind: type[Any] = Magician, line: Any = None, **options: Any
 ) -> AsyncIterator[Shown]:
     """A simulated arm that a panel has connected."""
-    async with simulate(model, speed=speed, faults=line) as sim:
-        async with panel({ARM: Member(sim.url, kind)}, port=0, **options) as running:
-            yield Shown(sim, running)
+    async with (
+        simulate(model, speed=speed, faults=line) as sim,
+        panel({ARM: Member(sim.url, kind)}, port=0, **options) as running,
+    ):
+        yield Shown(sim, running)
 
 
 @asynccontextmanager
@@ -173,7 +175,7 @@ async def page(rig: Shown, role: Role = Role.OPERATOR) -> AsyncIterator[Page]:
 async def until(condition: Callable[[], object]) -> None:
     """Returns when something has come about."""
     async with asyncio.timeout(IN_TIME):
-        while not condition():
+        while not condition():  # noqa: ASYNC110 - the arm is looked at
             await asyncio.sleep(0.005)
 
 
@@ -198,7 +200,7 @@ class VirtualPage(Seen):
 
     async def answer(self, number: int) -> dict[str, Any]:
         async with asyncio.timeout(60):
-            while not (answer := self.reply(number)):
+            while not (answer := self.reply(number)):  # noqa: ASYNC110 - no time passes for it
                 await asyncio.sleep(0.001)
 
         return answer
@@ -227,7 +229,7 @@ async def desk_of(arms: Any) -> AsyncIterator[tuple[Desk, Callable[..., VirtualP
         return found
 
     try:
-        while not all(station.connected for station in desk.stations.values()):
+        while not all(station.connected for station in desk.stations.values()):  # noqa: ASYNC110 - as above
             await asyncio.sleep(0.01)
 
         yield desk, join

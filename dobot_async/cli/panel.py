@@ -61,7 +61,10 @@ def panel(session: Session, /, more: tuple[str, ...], cell_file: Text | None, qr
 
     arms = chosen(session, more, cell_file)
     shown = {f"{role}_token": (made or tokens)[role] for role in TOKENS}
-    run(serve(session, arms, qr=qr, secret=any(tokens.values()), **shown, **options))
+    try:
+        run(serve(session, arms, qr=qr, secret=any(tokens.values()), **shown, **options))
+    except ImportError as error:  # the extra is missing
+        raise click.ClickException(str(error)) from None
 
 
 def tokens_of(**files: Path | None) -> dict[str, str | None]:

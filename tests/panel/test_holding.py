@@ -170,7 +170,7 @@ async def test_a_viewer_stops_it_and_the_lease_ends() -> None:
 async def test_who_takes_over_finds_an_arm_that_stands() -> None:
     async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
         page, other = await operator(join), join()
-        _, press = page.press("y+")
+        number, press = page.press("y+")
         await beats(page, press, 0.5)
         answer = await other.ask("take_lease", arm="arm")
         assert answer["error"]["kind"] == "lease"
@@ -178,6 +178,8 @@ async def test_who_takes_over_finds_an_arm_that_stands() -> None:
         assert not await stands(sim)
 
         await other.get("take_lease", arm="arm", takeover=True)
+        assert page.reply(number), "the jog had not ended when the lease was given away"
+        assert page.last("jog")["state"] == "ended"
         assert page.last("lease")["mine"] is False
         assert other.last("lease")["mine"] is True
         await beats(page, press, 0.5)
