@@ -26,6 +26,7 @@ from dobot_async.simulator.scene import Belt, Block, Piece, Scene
 __all__ = ["DESKTOP", "PHONE", "Cut", "Shown", "Stage", "stage", "until"]
 
 logger = logging.getLogger(__name__)
+VIEW = "dobot-async view"
 IN_TIME = 20.0  # seconds for what takes far less: the machine may be busy
 PHONE: dict[str, Any] = {
     "viewport": {"width": 412, "height": 915},
@@ -170,13 +171,20 @@ class Stage:
     shown: list[Shown] = field(default_factory=list)
 
     async def open(
-        self, device: dict[str, Any] = PHONE, *, viewer: bool = False, script: str = "", **options: Any
+        self,
+        device: dict[str, Any] = PHONE,
+        *,
+        viewer: bool = False,
+        solid: bool = False,
+        script: str = "",
+        **options: Any,
     ) -> Shown:
         """Open the panel on a device, and wait until it has the arm.
 
         Args:
             device: `PHONE` or `DESKTOP`.
             viewer: With the viewers' token.
+            solid: With the picture in 3-D, whose drawing in software is what costs most time in these tests.
             script: What runs in the page before its own scripts.
             options: More for the browser, such as color_scheme="dark".
         """
@@ -184,8 +192,10 @@ class Stage:
         shown = Shown(await context.new_page(), context)
         self.shown.append(shown)
         shown.watch()
-        if script:
-            await shown.page.add_init_script(script)
+        view = "3d" if solid else "2d"
+        await shown.page.add_init_script(
+            f"localStorage.getItem('{VIEW}') ?? localStorage.setItem('{VIEW}', '{view}');{script}"
+        )
 
         url = urlsplit(self.panel.viewer_url if viewer else self.panel.operator_url)
         await shown.page.goto(url._replace(netloc=f"127.0.0.1:{self.cut.port}").geturl())

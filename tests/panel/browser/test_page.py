@@ -65,7 +65,7 @@ async def violations(page: Page, axe: str) -> list[str]:
 
 async def test_nothing_goes_wrong_and_nobody_else_is_asked(magician: Stage) -> None:
     for name, device in (("phone", PHONE), ("desktop", DESKTOP)):
-        shown = await magician.open(device)
+        shown = await magician.open(device, solid=True)
         await shown.picture(f"{name}-watching")
         await shown.take_control()
         for tab in TABS:
@@ -81,7 +81,7 @@ async def test_nothing_goes_wrong_and_nobody_else_is_asked(magician: Stage) -> N
 
 
 async def test_the_first_load_is_small(magician: Stage) -> None:
-    phone = await magician.open(PHONE)
+    phone = await magician.open(PHONE, solid=True)
     await phone.page.wait_for_selector('.view[data-kind="3d"]')
     loaded = await phone.page.evaluate(
         "performance.getEntriesByType('resource').concat(performance.getEntriesByType('navigation'))"
@@ -91,7 +91,7 @@ async def test_the_first_load_is_small(magician: Stage) -> None:
 
 
 async def test_the_picture_shows_the_arm_and_moves_with_it(magician: Stage) -> None:
-    desktop = await magician.open(DESKTOP)
+    desktop = await magician.open(DESKTOP, solid=True)
     await desktop.page.wait_for_selector('.view[data-kind="3d"]')
     canvas = desktop.page.locator("canvas.picture")
 
@@ -120,6 +120,7 @@ async def test_the_picture_shows_the_arm_and_moves_with_it(magician: Stage) -> N
 async def test_without_webgl_the_picture_is_flat(magician: Stage) -> None:
     phone = await magician.open(
         PHONE,
+        solid=True,
         script=NO_WEBGL,
     )
     await phone.page.wait_for_selector('.view[data-kind="2d"]')
@@ -137,7 +138,7 @@ async def test_without_webgl_the_picture_is_flat(magician: Stage) -> None:
 @pytest.mark.parametrize("theme", ["light", "dark"])
 async def test_everybody_can_use_it(magician: Stage, axe: str, theme: str) -> None:
     for device in (PHONE, DESKTOP):
-        shown = await magician.open(device, color_scheme=theme)
+        shown = await magician.open(device, solid=True, color_scheme=theme)
         assert await violations(shown.page, axe) == []
         await shown.take_control()
         for tab in TABS if device is PHONE else ("Jog",):

@@ -193,8 +193,7 @@ async def test_the_arm_follows_a_finger_while_it_is_down(magician: Stage) -> Non
 
 async def test_the_tool_is_dragged_in_the_picture(magician: Stage) -> None:
     desktop = await magician.open(DESKTOP)
-    await desktop.page.wait_for_selector('.view[data-kind="3d"]')
-    await desktop.page.get_by_role("button", name="2-D").click()  # where a place is a place of the picture
+    await desktop.page.wait_for_selector('.view[data-kind="2d"]')  # where a place is a place of the picture
     await desktop.take_control()
     await desktop.page.get_by_label("Drag the tool in the picture").check()
     await magician.arm.move_to(200, 0, 50)

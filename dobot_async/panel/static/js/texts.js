@@ -80,7 +80,7 @@ export const texts = {
     laser: "Laser", arm: "Hold to arm the laser", armed: seconds => `Armed for ${Math.ceil(seconds)} s`, disarmed: "Not armed",
     armFor: "Arm for", seconds: "s", on: "On", off: "Off", laserOn: "Laser on",
     laserHint: "Hold the button for a second. Wear goggles; the laser goes off when the time is over.",
-    conveyor: "Conveyor", belt: "Speed", pulses: "pulses/s", run: "Run", motor: "Motor",
+    conveyor: "Conveyor", belt: "Speed", pulses: "pulses/s", run: "Run", stopBelt: "Stop the belt", motor: "Motor",
     rail: "Rail", railOn: "There is a rail", railTo: "Position", drive: "Drive",
     outputs: "Outputs", inputs: "Inputs", pin: "Pin", configureOut: "Use as output", configureIn: "Use as input", high: "high", low: "low",
     unknown: "not known", onArm: "On the arm", onArmNames: { suction: "Suction cup", gripper: "Gripper", pen: "Pen", laser: "Laser" }, notSaid: "not said",
@@ -114,7 +114,7 @@ export const texts = {
     left: seconds => `${seconds.toFixed(0)} s left`, by: who => `by ${who}`, running: "running", waiting: "waiting",
   },
   log: { title: "Log", empty: "Nothing so far." },
-  about: { title: "Arm", family: "Family", model: "Model", you: "You are", version: "Version", jogs: "Jogs at" },
+  about: { title: "Arm", family: "Family", model: "Model", you: "You are", name: "What others call you", rename: "Change", version: "Version", jogs: "Jogs at" },
   errors: {
     wrong: "Not sent", role: "Not allowed", lease: "Not in control", busy: "Busy", alarm: "Alarm", stopped: "Stopped", rejected: "Refused by the arm",
     unknown: "Not known", timeout: "No answer in time", link: "No connection", unsupported: "Not on this arm", late: "Too late", file: "File",

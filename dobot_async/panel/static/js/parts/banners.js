@@ -4,6 +4,8 @@ import { button, el, fill, say } from "../dom.js";
 import { icon } from "../icons.js";
 import { toast } from "../dialogs.js";
 
+const SOON = 2000; // ms; who takes control so soon after it was lost has taken it from us
+
 /** A name in capitals, as manuals have it, in words: JOINT_LIMIT is "Joint limit". */
 function inWords(name) {
   return /^[A-Z0-9_]+$/.test(name) ? name[0] + name.slice(1).toLowerCase().replaceAll("_", " ") : name;
@@ -15,7 +17,7 @@ export function banners(app) {
   const alarms = el("div", { role: "alert" });
   const lease = el("p.banner", { role: "status", hidden: true });
   const element = el("div.banners", {}, line, alarms, lease);
-  let before = { arm: "", mine: false };
+  let before = { arm: "", mine: false, lost: -Infinity };
 
   const showConnection = () => {
     const { state } = app.connection;
@@ -40,10 +42,10 @@ export function banners(app) {
     const words = !arm ? "" : app.mine ? "" : holder ? texts.lease.held(holder) : app.operator ? texts.lease.needed : "";
     say(lease, [words, app.operator ? "" : texts.lease.viewer].filter(Boolean).join(". ").replace("..", "."));
     lease.hidden = app.connection.state !== "open" || !lease.textContent;
-    if (before.arm === arm?.name && before.mine && !app.mine && app.connection.state === "open") {
-      toast(holder ? texts.lease.lostTo(holder) : texts.lease.ended, "error");
-    }
-    before = { arm: arm?.name, mine: app.mine };
+    const lost = before.arm === arm?.name && before.mine && !app.mine && app.connection.state === "open";
+    if (lost && !holder) toast(texts.lease.ended, "error");
+    if (holder && !app.mine && (lost || performance.now() - before.lost < SOON)) toast(texts.lease.lostTo(holder), "error");
+    before = { arm: arm?.name, mine: app.mine, lost: lost && !holder ? performance.now() : -Infinity };
   };
 
   return {

@@ -1,6 +1,6 @@
 // What goes on: the queue, the link's figures, the log, what the arm is.
 
-import { el, fill, fixed, say } from "../dom.js";
+import { button, el, field, fill, fixed, say } from "../dom.js";
 
 const FIGURES = ["round_trip", "requests", "repeated", "lost", "junk", "outages", "why"];
 
@@ -10,9 +10,11 @@ export function statusPart(app) {
   const pending = el("p.hint");
   const link = el("dl.facts");
   const about = el("dl.facts");
+  const name = field(texts.about.name, { maxlength: 30 });
+  const rename = button(texts.about.rename, () => name.input.value.trim() && app.act("name", { name: name.input.value.trim() }));
   const log = el("ol.log", { "aria-label": texts.log.title, tabindex: 0 });
   const card = (title, ...content) => el("section.card", { "aria-label": title }, el("h2", {}, title), content);
-  const element = el("div.cards", {}, card(texts.queue.title, queue, pending), card(texts.link.label, link), card(texts.log.title, log), card(texts.about.title, about));
+  const element = el("div.cards", {}, card(texts.queue.title, queue, pending), card(texts.link.label, link), card(texts.log.title, log), card(texts.about.title, about, el("div.row", {}, name.row, rename)));
   const facts = rows => rows.map(([name, value]) => el("div", {}, el("dt", {}, name), el("dd", {}, value)));
 
   const showQueue = () => {

@@ -57,7 +57,7 @@ const MAKERS = {
     const run = value => app.act("conveyor", { speed: value, motor: Number(motor.value) });
     const state = el("p.hint", { role: "status" });
     return {
-      elements: [speed.row, el("div.actions", {}, motor, button(app.texts.stop.one, () => run(0)), button(tools.run, () => run(Number(speed.input.value)), { class: "primary" })), state],
+      elements: [speed.row, el("div.actions", {}, motor, button(tools.stopBelt, () => run(0)), button(tools.run, () => run(Number(speed.input.value)), { class: "primary" })), state],
       show: io => say(state, Number.isFinite(io.conveyor) ? `${io.conveyor} ${tools.pulses}` : ""),
     };
   },
