@@ -1,5 +1,5 @@
 # make demo      a pick-and-place cycle on the built-in simulator, over a real pseudo-terminal
-# make panel     a simulated arm in the browser: make panel [URL=sim:] [HOST=127.0.0.1] [PORT=8080]
+# make panel     a simulated arm in the browser: make panel [ARM_URL=sim:] [OPTIONS="--port 0"]
 # make test      ruff, mypy and the whole test suite
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
@@ -17,12 +17,11 @@ BIN := $(VENV)/bin
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
 
-URL ?= sim:
-HOST ?= 127.0.0.1
-PORT ?= 8080
+ARM_URL ?= sim:
+OPTIONS ?=
 
 panel: $(VENV)/.panel
-	$(BIN)/python -m dobot_async --url '$(URL)' panel --host '$(HOST)' --port '$(PORT)'
+	$(BIN)/python -m dobot_async --url '$(ARM_URL)' panel $(OPTIONS)
 
 test: check pytest
 

@@ -42,10 +42,10 @@ TOKENS = {"operator": "DOBOT_PANEL_OPERATOR", "viewer": "DOBOT_PANEL_VIEWER"}
 def panel(session: Session, /, more: tuple[str, ...], cell_file: Text | None, qr: bool, **options: Any) -> None:
     """Show arms in the browser, until Ctrl-C.
 
-    The arm at --url, several as left=URL right=URL, or those of a cell file. sim: is simulated here, with pieces to
-    pick up. The first line of the output is the address to open; it has the token of operators in it if that was made
-    up, which it is at 127.0.0.1. For any other --host give both tokens, by files or in DOBOT_PANEL_OPERATOR and
-    DOBOT_PANEL_VIEWER, or say --make-tokens. Ctrl-C stops what the panel moves.
+    One arm by its URL as for every command, several as left=URL right=URL, or those of a cell file. sim: is simulated
+    here, with pieces to pick up. The first line of the output is the address to open; it has the token of operators in
+    it if that was made up, which it is at 127.0.0.1. For any other --host give both tokens, by files or in
+    DOBOT_PANEL_OPERATOR and DOBOT_PANEL_VIEWER, or say --make-tokens. Ctrl-C stops what the panel moves.
     """
     if session.trace:
         raise click.UsageError("a panel writes no trace; trace the program that moves the arm")

@@ -73,6 +73,11 @@ class Hold:
 
         return alive
 
+    @property
+    def is_over(self) -> bool:
+        """Whether it is over."""
+        return bool(self._why) or self._now() >= self._until
+
     def end(self, why: str) -> None:
         """End it; only the first reason counts."""
         self._why = self._why or why
@@ -112,6 +117,9 @@ async def held(
     Raises:
         DobotError: As the block.
     """
+    if hold.is_over:
+        return await hold.over()
+
     entered, end = asyncio.Event(), asyncio.Event()
 
     async def move() -> None:

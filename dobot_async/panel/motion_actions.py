@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine, Mapping
-from typing import Any
+from collections.abc import Callable, Coroutine, Mapping
+from contextlib import AbstractAsyncContextManager
+from typing import Any, TypeVar
 
 from dobot_async._core.util.text import printable
 from dobot_async.panel.arms import ArmView
@@ -29,6 +30,7 @@ __all__ = [
     "target",
 ]
 
+T = TypeVar("T")
 FAR = 2000.0  # mm and degrees; no arm of ours goes beyond
 FASTEST_FOLLOW = 300.0  # mm/s
 FOLLOWING = -1
@@ -111,31 +113,65 @@ def new_hold(call: Call, press: int) -> Hold:
     return Hold(ticks, press)
 
 
+async def hold_on(
+    call: Call, kind: str, hold: Hold, block: Callable[[], AbstractAsyncContextManager[T]], begun: Callable[[T], None]
+) -> Mapping[str, str]:
+    """Move the arm as long as a hand holds; tell the page when that is over, and why."""
+    station, why = call.station, "stopped"
+    try:
+        why = await held(hold, block, begun)
+    except Exception as error:
+        why = printable(str(error), 500)
+        raise
+    finally:
+        if station.holds.get(hold.press) is hold:
+            del station.holds[hold.press]
+
+        call.session.tell(kind, arm=station.name, press=hold.press, state="ended", why=why)
+
+    return {"why": why}
+
+
+def begin_to_hold(call: Call, hold: Hold, begin: Callable[[], Coroutine[Any, Any, Any]]) -> Coroutine[Any, Any, Any]:
+    """Begin with a hold, at once or, if something else was held, when that has ended; beats count from now on."""
+    station, going = call.station, call.station.works.alone
+    held_before = list(station.holds.values())
+    if going is None or not held_before:
+        station.holds[hold.press] = hold
+        try:
+            return begin()
+        except BaseException:
+            del station.holds[hold.press]
+            raise
+
+    for each in held_before:
+        each.end("another press")
+
+    station.holds[hold.press] = hold
+
+    async def after() -> Any:
+        await asyncio.wait({going})
+        return await begin()
+
+    return after()
+
+
 def jog(call: Call) -> Coroutine[Any, Any, Any]:
     """Jog while beats come."""
     station, session = call.station, call.session
     direction = call.given.word("direction", station.view.words)
     percent, press = call.given.number("speed", 1, 100, 20), call.given.whole("press", 0, 2**53)
     hold = new_hold(call, press)
+    call.given.end()
     session.check_press(press)
 
     def begun(_: None) -> None:
         session.tell("jog", arm=station.name, press=press, state="moving", why="")
 
-    async def jogged(view: ArmView, _: Work) -> Mapping[str, str]:
-        station.hold, why = hold, "stopped"
-        try:
-            why = await held(hold, lambda: view.jogging(direction, percent), begun)
-        except Exception as error:
-            why = printable(str(error), 500)
-            raise
-        finally:
-            station.hold = None
-            session.tell("jog", arm=station.name, press=press, state="ended", why=why)
+    def doing(view: ArmView, _: Work) -> Coroutine[Any, Any, Any]:
+        return hold_on(call, "jog", hold, lambda: view.jogging(direction, percent), begun)
 
-        return {"why": why}
-
-    return call.work(f"jog {direction}", jogged, alone=True)
+    return begin_to_hold(call, hold, lambda: call.work(f"jog {direction}", doing, alone=True))
 
 
 def press_of(call: Call) -> int:
@@ -145,24 +181,25 @@ def press_of(call: Call) -> int:
 
 def beat(call: Call) -> None:
     """It is still held."""
-    press, tick, hold = press_of(call), call.given.whole("tick", 0, 2**53), call.station.hold
+    hold, tick = call.station.holds.get(press_of(call)), call.given.whole("tick", 0, 2**53)
     call.given.end()
-    if hold and hold.press == press:
+    if hold:
         hold.beat(tick)
 
 
 def release(call: Call) -> None:
     """It is held no more."""
-    press, hold = press_of(call), call.station.hold
+    hold = call.station.holds.get(press_of(call))
     call.given.end()
-    if hold and hold.press == press:
+    if hold:
         hold.end("released")
 
 
 def follow(call: Call) -> Coroutine[Any, Any, Any]:
     """Follow targets while they come; the answer comes when the arm is ready."""
-    station, session = call.station, call.session
+    station = call.station
     speed, hold = call.given.number("max_speed", 1, FASTEST_FOLLOW, 100), new_hold(call, FOLLOWING)
+    call.given.end()
     ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
     def begun(found: Any) -> None:
@@ -170,14 +207,12 @@ def follow(call: Call) -> Coroutine[Any, Any, Any]:
         ready.set_result(None)
 
     async def followed(view: ArmView, _: Work) -> None:
-        station.hold, why = hold, "stopped"
         try:
-            why = await held(hold, lambda: view.following(speed), begun)
+            await hold_on(call, "follow", hold, lambda: view.following(speed), begun)
         finally:
-            station.hold = station.follow = None
-            session.tell("follow", arm=station.name, state="ended", why=why)
+            station.follow = None
 
-    waiting = call.work("follow", followed, alone=True)
+    waiting = begin_to_hold(call, hold, lambda: call.work("follow", followed, alone=True))
 
     async def begin() -> None:
         going = asyncio.ensure_future(waiting)
@@ -199,7 +234,8 @@ def target(call: Call) -> None:
         call.given.whole("tick", 0, 2**53),
     )
     call.given.end()
-    if station.follow and station.hold and station.hold.beat(tick):
+    hold = station.holds.get(FOLLOWING)
+    if station.follow and hold and hold.beat(tick):
         station.follow.target = numbers
 
 

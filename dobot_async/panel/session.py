@@ -99,9 +99,7 @@ class Session:
         stations = self.desk.stations.values()
         held = [station for station in stations if station.lease.holder is self]
         for station in held:  # at once: the rest may have to wait for others
-            if station.hold:
-                station.hold.end("left")
-
+            station.let_go("left")
             station.works.begin_to_end()
 
         await asyncio.gather(*(station.lease.end(self, "its page has gone") for station in stations))

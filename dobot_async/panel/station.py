@@ -36,7 +36,8 @@ __all__ = ["Station"]
 
 logger = logging.getLogger("dobot_async.panel")
 RETRY = 2.0  # seconds until an arm that did not answer is tried again
-QUICKLY = 2.0  # seconds for what is put in order when a lease ends
+WAY_OUT = 1.9  # seconds for all that is put in order when a lease ends, on a line that is dead as well
+AT_LEAST = 0.1  # seconds of them for what comes last
 SHARED = ("tcp", "ws", "wss", "zenoh")
 """Ways that may lead to a bridge, whose lease lasts as long as the connection: it is given back with the panel's."""
 
@@ -49,7 +50,7 @@ class Station:
         lease: Whose it is.
         works: What it does.
         taught: What it was taught.
-        hold: The hand that holds it in motion, None while none does.
+        holds: The hands that hold it in motion, or will when what they have held before has ended, by their presses.
         follow: What it follows, None while it follows nothing.
         armed_until: The loop's time until which the laser may be on.
     """
@@ -61,7 +62,7 @@ class Station:
         self.lease = Lease(self._begin_lease, self._end_lease, self._lease_changed)
         self.works = Works(self._works_changed)
         self.taught = Taught(self)
-        self.hold: Hold | None = None
+        self.holds: dict[int, Hold] = {}
         self.follow: Any = None
         self.armed_until = 0.0
         self.watched_inputs: tuple[int, ...] = ()
@@ -144,6 +145,11 @@ class Station:
         self._closed.set()
         self._gone.set()
 
+    def let_go(self, why: str) -> None:
+        """End all holds."""
+        for each in self.holds.values():
+            each.end(why)
+
     def start(self, work: Work, doing: Callable[[ArmView], Awaitable[Any]], owner: Party) -> asyncio.Task[Any]:
         """Begin something that moves the arm, for who has the lease; raise Refusal if that cannot be now."""
         self.lease.check(owner)
@@ -162,9 +168,7 @@ class Station:
         """
         view, holder = self.view, self.lease.holder
         self.log(f"{by.name} stops the arm", "warning")
-        if self.hold:
-            self.hold.end("stopped")
-
+        self.let_go("stopped")
         stopping = asyncio.create_task(view.arm.stop(), name=f"dobot_async panel stop of {self.name}")
         self._stops.add(stopping)
         stopping.add_done_callback(self._stop_ended)
@@ -254,17 +258,16 @@ class Station:
 
     async def _end_lease(self) -> None:
         """The arm stands, and nothing burns or turns; what was set for jogs is set back."""
-        if self.hold:
-            self.hold.end("left")
-
+        deadline = self._now() + WAY_OUT
+        self.let_go("left")
         await self.works.end()
         view = self._view
         if view is None:
             return
 
         self.armed_until = 0.0
-        with suppress(DobotError):
-            async with asyncio.timeout(QUICKLY):
+        with suppress(DobotError, TimeoutError):
+            async with asyncio.timeout_at(max(deadline, self._now() + AT_LEAST)):
                 if view.tools.dangerous:
                     view.tools.stopped()
                     await view.arm.stop()

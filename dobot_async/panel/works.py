@@ -64,6 +64,11 @@ class Works:
     def __len__(self) -> int:
         return len(self._going)
 
+    @property
+    def alone(self) -> asyncio.Task[Any] | None:
+        """What has the arm for itself, None if nothing does."""
+        return next((work.task for work in self._going.values() if work.alone), None)
+
     def told(self) -> list[dict[str, Any]]:
         """Return them as a page is told of them."""
         found: list[dict[str, Any]] = []

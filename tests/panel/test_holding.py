@@ -84,6 +84,25 @@ async def test_release_stops_it_sooner() -> None:
         assert await stands(sim)
 
 
+async def test_another_press_takes_the_place_of_the_first() -> None:
+    async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
+        page = await operator(join)
+        first, press = page.press("y+")
+        await beats(page, press, 0.5)
+        second, other = page.press("y-")
+        await beats(page, other, 1.0)
+        answer = page.reply(first)
+        assert answer
+        assert answer["value"] == {"why": "another press"}
+        assert not page.reply(second)
+        before = sim.arm.pose.y
+        await beats(page, other, 0.3)
+        assert sim.arm.pose.y < before
+        await beats(page, press, 0.5 + BRAKES)  # the first one is over
+        assert await stands(sim)
+        assert [each.value.cmd for each in jogs(sim)] == [c.JOGKey.BP_DOWN, c.JOGKey.BN_DOWN]
+
+
 async def test_a_press_that_is_over_is_not_revived() -> None:
     async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
         page = await operator(join)
@@ -183,6 +202,40 @@ async def test_who_takes_over_finds_an_arm_that_stands() -> None:
         assert page.last("lease")["mine"] is False
         assert other.last("lease")["mine"] is True
         await beats(page, press, 0.5)
+        assert await stands(sim)
+
+
+@pytest.mark.parametrize("held", [True, False])
+async def test_a_dead_line_keeps_the_end_of_the_panel_for_two_seconds(held: bool) -> None:
+    async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (desk, join):
+        page = await operator(join)
+        if held:
+            _, press = page.press("y+")
+            await beats(page, press, 0.5)
+        else:
+            page.send("move_to", arm="arm", x=200.0, y=150.0, z=40.0)
+            await asyncio.sleep(0.3)
+
+        sim.faults.silent = True
+        began = now()
+        await desk.aclose()
+        assert now() - began <= 2.2
+
+
+async def test_a_stop_is_repeated_on_a_dead_line_until_the_arm_hears_it() -> None:
+    async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
+        page, viewer = await operator(join), join(Role.VIEWER)
+        _, press = page.press("y+", speed=5)
+        await beats(page, press, 0.5)
+        sim.faults.silent = True
+        number = viewer.send("stop")
+        await asyncio.sleep(10)
+        answer = viewer.reply(number)
+        assert answer
+        assert answer["error"]["kind"] == "timeout"
+        assert not await stands(sim)
+        sim.faults.silent = False
+        await asyncio.sleep(5)
         assert await stands(sim)
 
 

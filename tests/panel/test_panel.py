@@ -295,7 +295,8 @@ async def test_two_things_that_need_the_arm_alone_do_not_go_together() -> None:
         await one.get("take_lease", arm=ARM)
         _, press = await one.press("y+")
         await one.hold(press, lambda: one.last("jog").get("state") == "moving")
-        assert await one.refused("jog", arm=ARM, direction="y-", press=press + 1, tick=one.tick) == "busy"
+        assert await one.refused("teach_play", arm=ARM) == "busy"
+        assert await one.refused("home", arm=ARM) == "busy"
         await one.send("release", arm=ARM, press=press)
         await until(lambda: one.last("jog")["state"] == "ended")
 

@@ -14,7 +14,7 @@ for (const type of ["pointerup", "pointercancel", "lostpointercapture"])
 
 
 async def test_it_moves_while_a_button_is_held_and_stands_when_it_is_let_go(magician: Stage) -> None:
-    phone = await magician.open(PHONE)
+    phone = await magician.open(PHONE, solid=True)
     await phone.take_control()
     await magician.hold(phone, "Jog y+")
     await phone.picture("phone-jogging")
@@ -64,6 +64,7 @@ async def test_a_network_that_is_cut_while_holding_stops_it(magician: Stage) -> 
     await magician.stands()
     stood = magician.where()
     await expect(phone.page.get_by_text("Connection lost")).to_be_visible(timeout=20_000)
+    await expect(phone.page.get_by_text("These were the last readings")).to_be_visible()
     await phone.picture("phone-connection-lost")
     await phone.page.mouse.up()
     magician.cut.cut = False

@@ -56,7 +56,7 @@ async def test_an_alarm_is_told_in_words_and_recovered_from(magician: Stage) -> 
 
 
 async def test_three_points_are_taught_put_in_order_and_played(magician: Stage) -> None:
-    phone = await magician.open(PHONE)
+    phone = await magician.open(PHONE, solid=True)
     await phone.take_control()
     taught = [(200.0, -60.0, 60.0), (230.0, 0.0, 40.0), (200.0, 60.0, 60.0)]
     for count, place in enumerate(taught, 1):
@@ -73,6 +73,7 @@ async def test_three_points_are_taught_put_in_order_and_played(magician: Stage) 
     await phone.picture("phone-edit-point")
     await phone.page.get_by_role("button", name="Save", exact=True).click()
     await expect(phone.page.locator(".steps li").first).to_contain_text("the first")
+    await phone.page.locator(".teach").scroll_into_view_if_needed()
     await phone.picture("phone-taught")
 
     before = len(magician.sim.arm.executed)
@@ -114,7 +115,7 @@ async def test_a_recording_is_saved_and_loaded(magician: Stage) -> None:
 
 
 async def test_a_drawing_is_placed_by_dragging_and_drawn(magician: Stage) -> None:
-    desktop = await magician.open(DESKTOP)
+    desktop = await magician.open(DESKTOP, solid=True)
     await desktop.take_control()
     await magician.arm.move_to(230, 0, 0)
     await desktop.page.set_input_files("#draw-file", {"name": "logo.svg", "mimeType": "image/svg+xml", "buffer": LOGO})

@@ -98,7 +98,9 @@ class App {
     }
   }
 
+  /** Show what went wrong; that there is no connection is in a banner already. */
   complain(error) {
+    if (error.kind === "link" && this.connection.state !== "open") return;
     toast(`${texts.errors[error.kind] ?? texts.errors.bug}: ${error.message}`, "error");
   }
 

@@ -47,7 +47,7 @@ export const texts = {
     three: "3-D", two: "2-D", top: "from above", side: "from the side",
     home: "Reset the view", clear: "Clear the trace", noWebGL: "This browser has no WebGL: the view is 2-D.",
   },
-  pose: { label: "Pose", joints: "Joints", moving: "moving", rests: "at rest", unknown: "no reading yet" },
+  pose: { label: "Pose", joints: "Joints", moving: "moving", rests: "at rest", unknown: "no reading yet", stale: "These were the last readings." },
   alarms: { title: "Alarm", remedy: "What to do", recover: "Recover", recovering: "Recovering …" },
   home: { label: "Home", busy: "Homing …" },
   pause: "Pause", resume: "Resume", power: "Power",
@@ -67,7 +67,7 @@ export const texts = {
   },
   follow: {
     title: "Follow", pad: "x, y: drag here to lead the tool", height: "z: drag here to lift and lower the tool",
-    hint: "The tool follows your finger while it is down. Dragging the tool in the picture does the same.",
+    hint: "The tool follows your finger while it is down.",
     drag: "Drag the tool in the picture", speed: "Top speed", unit: "mm/s",
     padLabel: "x, y", heightLabel: "z",
     gamepad: "Gamepad", noGamepad: "Press a button of a gamepad to use it here.",

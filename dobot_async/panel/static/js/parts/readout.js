@@ -7,6 +7,7 @@ export function readout(app) {
   const { texts } = app;
   const pose = el("dl.numbers", { "aria-label": texts.pose.label });
   const joints = el("dl.numbers.joints", { "aria-label": texts.pose.joints });
+  const figures = el("div.figures", {}, pose, joints);
   const moving = el("span.moving");
   const doing = el("span.doing");
   const bar = el("progress", { max: 1, hidden: true, "aria-label": texts.queue.running });
@@ -15,7 +16,7 @@ export function readout(app) {
   const resume = button([icon("play"), texts.resume], () => app.act("resume"));
   const power = button([icon("power"), texts.power], () => app.act("power"));
   const gate = el("fieldset.gate.actions", { "aria-label": texts.title }, home, pause, resume, power);
-  const element = el("section.readout", { "aria-label": texts.pose.label }, el("div.figures", {}, pose, joints), el("div.activity", {}, moving, doing, bar), gate);
+  const element = el("section.readout", { "aria-label": texts.pose.label }, figures, el("div.activity", {}, moving, doing, bar), gate);
   let cells = [];
 
   const build = () => {
@@ -38,13 +39,15 @@ export function readout(app) {
   const numbers = () => {
     const state = app.arm?.state;
     for (const [read, value] of cells) say(value, fixed(state ? read(state) : undefined));
-    const words = !state ? texts.pose.unknown : state.moving === null || state.moving === undefined ? "" : state.moving ? texts.pose.moving : texts.pose.rests;
+    const stale = app.connection.state !== "open";
+    mark(figures, "data-stale", stale && state ? "yes" : false);
+    const words = stale && state ? texts.pose.stale : !state ? texts.pose.unknown : state.moving === null || state.moving === undefined ? "" : state.moving ? texts.pose.moving : texts.pose.rests;
     say(moving, words);
-    mark(moving, "data-moving", state?.moving ? "yes" : false);
+    mark(moving, "data-moving", state?.moving && !stale ? "yes" : false);
   };
 
   const activity = () => {
-    const running = app.arm?.queue.items.find(item => item.state === "running");
+    const running = app.connection.state === "open" && app.arm?.queue.items.find(item => item.state === "running");
     say(doing, running ? [running.text, Number.isFinite(running.seconds_left) ? texts.queue.left(running.seconds_left) : ""].filter(Boolean).join(" · ") : "");
     bar.hidden = !Number.isFinite(running?.progress);
     if (!bar.hidden) bar.value = running.progress;
@@ -54,8 +57,8 @@ export function readout(app) {
     element,
     update(topic) {
       if (topic === "select") build();
-      if (topic === "state") numbers();
-      if (topic === "queue" || topic === "select") activity();
+      if (topic === "state" || topic === "connection") numbers();
+      if (["queue", "select", "connection"].includes(topic)) activity();
       if (["select", "lease", "connection"].includes(topic)) gate.disabled = !app.mine;
     },
   };

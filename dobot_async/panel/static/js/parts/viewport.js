@@ -1,6 +1,7 @@
 // The picture of the cell: 3-D where the browser can, 2-D where it cannot or where that is wanted.
 
 import { button, el, fill, say } from "../dom.js";
+import { toast } from "../dialogs.js";
 import { icon } from "../icons.js";
 import { View2D } from "../view/view2d.js";
 
@@ -10,7 +11,6 @@ const MOVING = new Set(["state", "scene", "arms", "target", "lease"]);
 export function viewport(app) {
   const { texts } = app;
   const place = el("div.canvas");
-  const note = el("p.note", { role: "status" });
   const kind = button("", () => show(view instanceof View2D ? "3d" : "2d", true), { class: "chip" });
   const home = button(icon("reset"), () => view?.home(), { class: "icon-button", "aria-label": texts.view.home });
   const clear = button(icon("eraser"), () => {
@@ -18,9 +18,10 @@ export function viewport(app) {
     app.model.strokes = [];
     view?.update();
   }, { class: "icon-button", "aria-label": texts.view.clear });
-  const element = el("section.view", { "aria-label": texts.view.label }, place, el("div.view-tools", {}, kind, home, clear), note);
+  const element = el("section.view", { "aria-label": texts.view.label }, place, el("div.view-tools", {}, kind, home, clear));
   let view = null;
   let possible = true;
+  let told = false;
 
   const hooks = {
     selected: () => app.arm, lead: app.follower, words: texts.view,
@@ -42,7 +43,8 @@ export function viewport(app) {
     fill(place, view.element);
     kind.hidden = !possible;
     say(kind, view instanceof View2D ? texts.view.three : texts.view.two);
-    say(note, possible ? "" : texts.view.noWebGL);
+    if (!possible && !told) toast(texts.view.noWebGL);
+    told ||= !possible;
     element.dataset.kind = view instanceof View2D ? "2d" : "3d";
   };
 

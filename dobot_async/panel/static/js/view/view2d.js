@@ -82,7 +82,7 @@ export class View2D {
     this.side.fit(xs, zs, rest);
     this.drawSide(xs, zs);
     this.above.text(this.hooks.words.top, [8, 18], this.colors["view-ink"]);
-    this.above.text(this.hooks.words.side, [rest[0] + 8, rest[1] + 18], this.colors["view-ink"]);
+    this.above.text(this.hooks.words.side, [rest[0] + 8, rest[1] + rest[3] - 8], this.colors["view-ink"]);
   }
 
   drawAbove(xs, ys) {
