@@ -68,7 +68,7 @@ class App {
 
   changed() {
     if (this.connection.state !== "open") {
-      releaseAll("lost");
+      releaseAll("connection");
       for (const arm of this.model.arms.values()) arm.lease = { holder: null, mine: false };
     }
     this.update("connection");
