@@ -7,6 +7,8 @@ import asyncio
 from panel_stage import DESKTOP, PHONE, Stage, distance, until
 from playwright.async_api import expect
 
+pytest_plugins = ["panel_browser"]
+
 DEAF = """
 for (const type of ["pointerup", "pointercancel", "lostpointercapture"])
     window.addEventListener(type, event => event.stopImmediatePropagation(), true);

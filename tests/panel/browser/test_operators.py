@@ -7,6 +7,8 @@ from playwright.async_api import expect
 
 from dobot_async.magician import commands as c
 
+pytest_plugins = ["panel_browser"]
+
 EVIL = "<!doctype html><title>another page</title>"
 TRIES = """() => new Promise(resolve => {
     const socket = new WebSocket(`ws://${location.host}/ws`), answers = [];

@@ -16,6 +16,8 @@ from panel_stage import DESKTOP, PHONE, Stage, until
 from PIL import Image
 from playwright.async_api import Page, expect
 
+pytest_plugins = ["panel_browser"]
+
 AXE = "4.14.1"
 AXE_SHA512 = "FHfa+lmNjQZfJz1q8wKqIDwC6DExcHt/pkjNQb09a3NPjCKg2rhu5qb2S4r76ASyFNNtuFooJpZe37OgudVGtQ=="
 LARGEST_LOAD = 400_000

@@ -10,6 +10,8 @@ from playwright.async_api import expect
 
 from dobot_async.magician import commands as c
 
+pytest_plugins = ["panel_browser"]
+
 LOGO = b"""<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="40mm" viewBox="0 0 40 40">
 <path d="M5 5 H35 V35 H5 Z M12 20 L20 28 L30 12" fill="none" stroke="black"/></svg>"""
 GAMEPAD = """
