@@ -8,6 +8,7 @@ from contextlib import AbstractAsyncContextManager
 from typing import Any, TypeVar
 
 from dobot_async._core.util.text import printable
+from dobot_async.errors import DobotError
 from dobot_async.panel.arms import ArmView
 from dobot_async.panel.calls import Call
 from dobot_async.panel.holding import Hold, held
@@ -235,8 +236,14 @@ def target(call: Call) -> None:
     )
     call.given.end()
     hold = station.holds.get(FOLLOWING)
-    if station.follow and hold and hold.beat(tick):
+    if not (station.follow and hold and hold.beat(tick)):
+        return
+
+    try:
         station.follow.target = numbers
+    except DobotError as error:  # the following has failed
+        hold.end(printable(str(error), 500))
+        raise
 
 
 def speed(call: Call) -> Coroutine[Any, Any, Any]:

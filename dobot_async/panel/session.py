@@ -72,7 +72,7 @@ class Session:
             given = message.pop("id", None)
             number = given if isinstance(given, int) and not isinstance(given, bool) else None
             self._do(number, message)
-        except (Refusal, ValueError) as error:
+        except Exception as error:  # noqa: BLE001 - one message that fails is not the end of the page
             self._reply(number, error=told(error))
 
     def tell(self, kind: str, **more: Any) -> None:

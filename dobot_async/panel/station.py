@@ -167,7 +167,9 @@ class Station:
             DobotError: The arm has not acknowledged it yet; it is told again until it does.
         """
         view, holder = self.view, self.lease.holder
-        self.log(f"{by.name} stops the arm", "warning")
+        if not self._stops:  # a page says it again and again until it has an answer
+            self.log(f"{by.name} stops the arm", "warning")
+
         self.let_go("stopped")
         stopping = asyncio.create_task(view.arm.stop(), name=f"dobot_async panel stop of {self.name}")
         self._stops.add(stopping)

@@ -255,6 +255,39 @@ async def test_following_ends_with_the_targets() -> None:
         await page.get("home", arm="arm")  # the arm is free again
 
 
+async def test_a_following_that_fails_ends_and_the_page_stays() -> None:
+    async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
+        page = await operator(join)
+        await page.get("follow", arm="arm", tick=page.tick)
+        for number in range(40):
+            if number == 10:
+                sim.arm.raise_alarm(0x51)
+
+            await asyncio.sleep(0.05)
+            page.send("target", arm="arm", target=[230.0, 2.0 * number, 20.0], tick=page.tick)
+
+        assert page.last("follow")["state"] == "ended"
+        assert "alarm" in page.last("follow")["why"] or "0x51" in page.last("follow")["why"]
+        assert "alarm" in {each["error"]["kind"] for each in page.of("reply") if not each["ok"]}
+        assert page.last("lease")["mine"] is True
+        await page.get("ping")
+        await page.get("recover", arm="arm")
+        await page.get("move_to", arm="arm", x=220.0, y=0.0, z=40.0)
+
+
+async def test_a_stop_may_be_said_again_and_again() -> None:
+    async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
+        page, viewer = await operator(join), join(Role.VIEWER)
+        page.send("move_to", arm="arm", x=200.0, y=150.0, z=40.0)
+        await asyncio.sleep(0.3)
+        numbers = [viewer.send("stop") for _ in range(5)]
+        for number in numbers:
+            assert (await viewer.answer(number))["ok"]
+
+        assert await stands(sim)
+        assert sum("stops the arm" in each["text"] for each in viewer.of("log")) == 1
+
+
 async def test_a_bad_line_and_a_page_that_comes_and_goes_leave_no_motion_without_a_hand() -> None:
     """An hour of it, in virtual time, with 2 percent of all messages lost."""
     async with (
