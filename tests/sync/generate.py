@@ -100,8 +100,8 @@ ARM = {"link": "Link"}
 WRITTEN = ("stream",)
 MOTION = """One queued command; any number of threads may wait for it.
 
-`wait` returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or ConnectionLost when it
-has not. It belongs to its queue: interrupting who waits for it only ends the waiting."""
+`wait` returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or ConnectionLost
+when it has not. It belongs to its queue: interrupting who waits for it only ends the waiting."""
 
 PAGES: dict[str, Page] = {
     "magician": Page(
@@ -168,7 +168,9 @@ PAGES: dict[str, Page] = {
             Twin(
                 "dobot_async:Motion",
                 base="MotionTwin",
-                omit=("accept", "end", "call", "withdrawn", "accepted_or_ended"),
+                about=MOTION,
+                reads={"name": "str", "moves": "bool", "index": "int | None"},
+                omit=("accept", "end", "done"),
             ),
         ),
     ),
@@ -512,9 +514,9 @@ WORDS = (
     (r"await (?=(arm|robot)\.)", ""),
     (r"async with ", "with "),
     (r"async for ", "for "),
-    (r"await motion", "it"),
+    (r"Wait as `await motion` does, for", "Wait until it has ended, for"),
     (r"to be awaited( |\.)", r"to be waited for\1"),
-    (r"may be awaited", "may be waited for"),
+    (r"which may be awaited", "to be waited for"),
     (r"nobody awaits", "nobody waits for"),
     (r"call that awaits it", "call that waits for it"),
     (r"await it ", "wait for it "),
