@@ -48,8 +48,9 @@ class Member(AsyncMember[A]):
 
     def asynchronous(self) -> AsyncMember[Any]:
         """What the fleet is told; raises ValueError if something does not fit."""
-        given = {field.name: getattr(self, field.name) for field in fields(self)}
-        return AsyncMember(**given | {"kind": asynchronous_of(self.kind)})
+        given: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        given["kind"] = asynchronous_of(self.kind)
+        return AsyncMember(**given)
 
 
 class Together(Twin[AsyncTogether[Any]], Generic[B]):

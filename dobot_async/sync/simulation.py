@@ -6,7 +6,6 @@ import functools
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import is_dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Generic, Literal, cast, overload
 
@@ -122,18 +121,19 @@ def inside(value: T) -> T:
 
 def seen(value: Any) -> Any:
     """Return what was read of an object, so that it can be used in another thread: lists and the like as copies."""
-    if isinstance(value, list | set | deque):
-        return type(value)(value)
+    kind: Any = cast(Any, type(value))
+    if issubclass(kind, (list, set, deque)):
+        return kind(value)
 
-    if isinstance(value, Mapping):
-        return {key: seen(each) for key, each in value.items()}
+    if issubclass(kind, Mapping):
+        return {key: seen(value[key]) for key in value}
 
     if callable(value) and not isinstance(value, type):
         return called_there(value)
 
-    frozen = is_dataclass(value) and getattr(value, "__dataclass_params__").frozen  # noqa: B009 - it has no type
-    is_ours = type(value).__module__.startswith("dobot_async") and not isinstance(value, Enum | tuple)
-    return Inside(value) if is_ours and not frozen else value
+    params: Any = getattr(kind, "__dataclass_params__", None)
+    is_value = issubclass(kind, (Enum, tuple)) or (params and params.frozen)
+    return Inside(value) if kind.__module__.startswith("dobot_async") and not is_value else value
 
 
 def called_there(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,4 +1,4 @@
-"""Writes the blocking classes of `dobot_async.sync` out of the asynchronous ones: python tests/sync/generate.py
+"""Writes the blocking classes of `dobot_async.sync` out of the asynchronous ones: python tests/sync/write_sync.py
 
     class of the driver --> its public members, as they stand in the source
         async def f(...) -> R              def f(...) -> R                              waits
@@ -203,6 +203,13 @@ def twin_homes() -> dict[str, str]:
     return {name: page for page, name in homes().values()}
 
 
+def pages() -> Iterator[tuple[ModuleType, Twin]]:
+    """Each class that is written, with the module that it is in."""
+    for name, page in PAGES.items():
+        for twin in page.twins:
+            yield import_module(f"{PACKAGE}.{name}"), twin
+
+
 class Source:
     """A module of the driver, as far as its names are concerned."""
 
@@ -239,7 +246,7 @@ class Writer:
         lines = [
             f'"""{about.about}',
             "",
-            'Written by tests/sync/generate.py: change what that reads, and run it again.\n"""',
+            'Written by tests/sync/write_sync.py: change what that reads, and run it again.\n"""',
             "",
         ]
         lines += ["from __future__ import annotations", ""]
@@ -553,7 +560,7 @@ def call_of(node: ast.arguments) -> str:
 def tidy(text: str, name: str) -> str:
     """The text as ruff has it."""
     path = ROOT / "dobot_async" / "sync" / f"{name}.py"
-    for command in (["check", "--fix-only", "--select", "I,RUF022,PYI,UP,D", "-q"], ["format", "-q"]):
+    for command in (["check", "--fix-only", "-q"], ["format", "-q"]):
         ruff = [sys.executable, "-m", "ruff", *command, "--stdin-filename", str(path), "-"]
         text = subprocess.run(ruff, input=text, capture_output=True, text=True, check=True, cwd=ROOT).stdout
 
