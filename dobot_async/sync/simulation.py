@@ -6,6 +6,7 @@ import functools
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
+from copy import copy
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Generic, Literal, cast, overload
 
@@ -123,7 +124,7 @@ def seen(value: Any) -> Any:
     """Return what was read of an object, so that it can be used in another thread: lists and the like as copies."""
     kind: Any = cast(Any, type(value))
     if issubclass(kind, (list, set, deque)):
-        return kind(value)
+        return copy(value)
 
     if issubclass(kind, Mapping):
         return {key: seen(value[key]) for key in value}
