@@ -20,6 +20,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
 __all__ = ["Call", "Caller", "Own", "in_thread"]
@@ -228,7 +229,7 @@ class Own:
         self.caller = caller
 
     def __del__(self) -> None:
-        if not self.caller.loop.is_closed():
+        with suppress(RuntimeError):  # the loop has ended before
             self.caller.loop.call_soon_threadsafe(self.caller.end)
 
 

@@ -15,6 +15,8 @@ import pytest
 
 from dobot_async.simulator import simulate
 
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no SIGHUP, and no SIGTERM that can be handled")
+
 HEAD = """
 import os, signal, sys, threading, time
 from dobot_async.sync import Magician
