@@ -1,21 +1,19 @@
-"""What is written by hand of arms, queues, batches and motions."""
+"""What is written by hand of arms, queues and batches."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from dobot_async import Motion as AsyncMotion
 from dobot_async._core.queue.stream import StreamStep
+from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.streams import Stream, drawn
 from dobot_async.sync.twin import Twin
 from dobot_async.wire import Command
 
-if TYPE_CHECKING:
-    from dobot_async.sync.motion import Motion
-
-__all__ = ["ArmTwin", "BatchTwin", "MotionTwin", "QueueTwin", "motions"]
+__all__ = ["ArmTwin", "BatchTwin", "QueueTwin", "motions"]
 
 Q = TypeVar("Q")
 S = TypeVar("S", bound=StreamStep)
@@ -26,14 +24,7 @@ A = TypeVar("A")
 
 def motions(found: Iterable[AsyncMotion]) -> list[Motion]:
     """Return the twins of Motions."""
-    return [motion(each) for each in found]
-
-
-def motion(found: AsyncMotion) -> Motion:
-    """Return the twin of a Motion."""
-    from dobot_async.sync.motion import Motion  # noqa: PLC0415 - which is made of what is here
-
-    return Motion(found)
+    return [Motion(each) for each in found]
 
 
 class ArmTwin(Twin[A]):
@@ -60,12 +51,12 @@ class QueueTwin(Twin[A]):
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Motion:
         """Queue a command."""
         queue: Any = self.asynchronous
-        return motion(PORTAL.run(lambda: queue.perform(command, value, timeout)))
+        return Motion(PORTAL.run(lambda: queue.perform(command, value, timeout)))
 
     def perform_from_goal(self, plan: Any, needs: Any, timeout: float | None) -> Motion:
         """Queue what a plan makes of where the arm will be then."""
         queue: Any = self.asynchronous
-        return motion(PORTAL.run(lambda: queue.perform_from_goal(plan, needs, timeout)))
+        return Motion(PORTAL.run(lambda: queue.perform_from_goal(plan, needs, timeout)))
 
     def stream(self, steps: Iterable[S]) -> Stream[S]:
         """Queue steps as they come, as fast as the arm takes them; iterated over, it yields each one that is done.
@@ -110,26 +101,9 @@ class BatchTwin(Twin[A]):
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Motion:
         """Add a command."""
         batch: Any = self.asynchronous
-        return motion(PORTAL.look(lambda: batch.perform(command, value, timeout)))
+        return Motion(PORTAL.look(lambda: batch.perform(command, value, timeout)))
 
     def perform_from_goal(self, plan: Any, needs: Any, timeout: float | None) -> Motion:
         """Add what a plan makes of where the arm will be then."""
         batch: Any = self.asynchronous
-        return motion(PORTAL.look(lambda: batch.perform_from_goal(plan, needs, timeout)))
-
-
-class MotionTwin(Twin[AsyncMotion]):
-    """A Motion."""
-
-    __slots__ = ()
-
-    @property
-    def done(self) -> bool:
-        """Whether it has ended, well or not. Whoever looks again and again has the arm asked for a while each time."""
-        return self.asynchronous.ended or PORTAL.look(lambda: self.asynchronous.done)
-
-    def __str__(self) -> str:
-        return str(self.asynchronous)
-
-    def __repr__(self) -> str:
-        return repr(self.asynchronous)
+        return Motion(PORTAL.look(lambda: batch.perform_from_goal(plan, needs, timeout)))

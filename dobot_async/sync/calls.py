@@ -20,7 +20,6 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
 __all__ = ["Call", "Caller", "Own", "in_thread"]
@@ -229,8 +228,10 @@ class Own:
         self.caller = caller
 
     def __del__(self) -> None:
-        with suppress(RuntimeError):  # the loop has ended before
+        try:  # noqa: SIM105 - at the end of the interpreter there is no contextlib any more
             self.caller.loop.call_soon_threadsafe(self.caller.end)
+        except RuntimeError:
+            pass  # the loop has ended before
 
 
 async def in_thread(function: Callable[[], R]) -> R:

@@ -6,7 +6,7 @@ Written by tests/sync/write_sync.py: change what that reads, and run it again.
 from __future__ import annotations
 
 from dobot_async.errors import DobotError
-from dobot_async.sync.bases import MotionTwin
+from dobot_async.sync.motion_base import MotionTwin
 from dobot_async.sync.portal import PORTAL
 
 __all__ = ["Motion"]

@@ -51,7 +51,7 @@ NOT_THERE: dict[type[Any], set[str]] = {
 }
 WAITS = (
     (r"Coroutine\[Any, Any, (.*)\]", r"\1"),
-    (r"AsyncIterator\[(.*)\]", r"Items[\1]"),
+    (r"Async(Iterator|Generator)\[(.*?)(, None)?\]", r"Items[\2]"),
     (r"AbstractAsyncContextManager\[(.*)\]", r"AbstractContextManager[\1]"),
 )
 
@@ -116,8 +116,8 @@ def test_a_member_returns_what_the_other_one_gives_when_it_is_awaited(
         return  # overloaded, or another class: tests of the types look at these
 
     wanted = str(given)
-    if hasattr(original, "__wrapped__") and wanted.startswith("AsyncIterator"):  # of a block
-        wanted = wanted.replace("AsyncIterator", "AbstractContextManager", 1)
+    if hasattr(original, "__wrapped__"):  # a block
+        wanted = re.sub(r"^Async(Iterator|Generator)\[(.*?)(, None)?\]$", r"AbstractContextManager[\2]", wanted)
 
     for pattern, without in WAITS:
         wanted = re.sub(pattern, without, wanted)

@@ -323,7 +323,7 @@ class Writer:
     def base(self, twin: Twin, original: str) -> str:
         """The class that holds the asynchronous object."""
         if twin.base == "MotionTwin":
-            return self.sync("bases", twin.base)
+            return self.sync("motion_base", twin.base)
 
         return f"{self.sync('bases', twin.base) if twin.base else self.sync('twin', 'Twin')}[{original}]"
 
@@ -419,7 +419,8 @@ class Writer:
         name = ast.unparse(returns.value) if isinstance(returns, ast.Subscript) else ""
         if "asynccontextmanager" in words or name == "AbstractAsyncContextManager":
             assert isinstance(returns, ast.Subscript)
-            return "block", returns.slice
+            inner = returns.slice
+            return "block", inner.elts[0] if isinstance(inner, ast.Tuple) else inner
 
         if name in {"AsyncIterator", "AsyncGenerator"}:
             assert isinstance(returns, ast.Subscript)
