@@ -4,6 +4,8 @@
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
 # make format    what ruff can mend
+# make sync      writes the blocking classes out of the asynchronous ones again
+# make lerobot   the contract tests of integrations/, with LeRobot but without what only its training needs
 # make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|stops]
 # make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
@@ -12,7 +14,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo panel test test-all test-minimum check pytest format clean fuzz promises soak
+.PHONY: demo panel sync lerobot test test-all test-minimum check pytest format clean fuzz promises soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
@@ -30,6 +32,9 @@ check: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+sync: $(VENV)/.dev
+	$(BIN)/python tests/sync/write_sync.py
 
 format: $(VENV)/.dev
 	$(BIN)/ruff check --fix .
@@ -65,6 +70,18 @@ OF ?= arm
 
 soak: $(VENV)/.dev
 	$(BIN)/python tests/simulation/soak.py --of $(OF) --seeds $(SEEDS) --first $(FIRST)
+
+LEROBOT := 'lerobot>=0.4.4,<0.5'
+LEROBOT_NEEDS := 'draccus==0.10.0' 'deepdiff>=7.0.1,<9' 'huggingface-hub>=0.34.2,<0.36' 'jsonlines>=4' 'numpy>=2' termcolor tqdm
+
+lerobot: .venv-lerobot/.lerobot
+	DOBOT_REQUIRE_LEROBOT=1 .venv-lerobot/bin/python -m pytest tests/test_integrations.py
+
+.venv-lerobot/.lerobot: pyproject.toml
+	$(PYTHON) -m venv .venv-lerobot
+	.venv-lerobot/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]' $(LEROBOT_NEEDS)
+	.venv-lerobot/bin/python -m pip install --quiet --disable-pip-version-check --no-deps $(LEROBOT)
+	touch $@
 
 ANSWERS ?= 200000
 

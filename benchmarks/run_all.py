@@ -38,6 +38,7 @@ NAMES = (
     "many",
     "families",
     "stream",
+    "sync",
     "ble",
     "panel",
 )
