@@ -26,7 +26,7 @@ from dobot_async.sync.magician import Batch, Magician
 from dobot_async.sync.mycobot import CobotBatch, MyCobot
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.twin import Block, Twin
-from dobot_async.sync.twins import asynchronous_of, twin_of
+from dobot_async.sync.twins import asynchronous_of, blocking_of, twin_of
 from dobot_async.sync.ultraarm import UltraArm, UltraArmBatch
 
 __all__ = ["Fleet", "Member", "Together"]
@@ -173,6 +173,17 @@ class Fleet(Twin[AsyncFleet[Any]], Generic[A]):
     def arm(self, name: str, kind: type[K]) -> K:
         """Returns an arm of a family, typed; raises TypeError if it is of another."""
         return cast(K, twin_of(self.asynchronous.arm(name, asynchronous_of(kind))))
+
+    def member(self, name: str) -> Member[A]:
+        """Returns what the fleet was told of an arm before it was connected."""
+        told = self.asynchronous.member(name)
+        given: dict[str, Any] = {field.name: getattr(told, field.name) for field in fields(told)}
+        return Member(**{**given, "kind": blocking_of(told.kind)})
+
+    @property
+    def zones(self) -> Mapping[str, Shape | None]:
+        """Where each zone is, by name; None for one that is nowhere in particular."""
+        return self.asynchronous.zones
 
     def base(self, name: str) -> BaseFrame:
         """Returns where an arm stands in the cell."""

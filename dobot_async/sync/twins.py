@@ -14,7 +14,7 @@ from dobot_async.sync.magician import Batch, Magician
 from dobot_async.sync.mycobot import CobotBatch, MyCobot
 from dobot_async.sync.ultraarm import UltraArm, UltraArmBatch
 
-__all__ = ["asynchronous_of", "twin_of"]
+__all__ = ["asynchronous_of", "blocking_of", "twin_of"]
 
 TWINS: dict[type[Any], type[Any]] = {
     AsyncMagician: Magician,
@@ -43,3 +43,8 @@ def asynchronous_of(kind: type[Any]) -> type[Any]:
             return asynchronous
 
     raise TypeError(f"expected a class of dobot_async.sync, such as Magician, not {kind!r}")
+
+
+def blocking_of(kind: type[Any]) -> type[Any]:
+    """Return the blocking class of an asynchronous arm, whatever a fleet has made of it."""
+    return next(twin for asynchronous, twin in TWINS.items() if issubclass(kind, asynchronous))
