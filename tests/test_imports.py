@@ -1,7 +1,7 @@
 """The way of the imports, read from the source: layers know nothing of higher ones, and families not of each other.
 
 errors <- wire, util <- transports <- link <- queue <- following <- arms <- families <- discovery <- simulator
-<- toolpath, handling <- teaching <- cli <- __main__
+<- toolpath, handling <- teaching <- sync <- cli <- __main__
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ LAYERS = (
     ("simulator", "bridge"),
     ("toolpath", "handling"),
     ("teaching",),
+    ("sync",),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )
@@ -109,8 +110,9 @@ def test_the_layers_are_seen_at_all() -> None:
 
 
 def test_modules_are_named_as_strings_in_the_places_alone_that_import_late() -> None:
-    late = {name_of(path) for path in SOURCES if words(path) & {"import_module", "__import__", "importlib"}}
-    assert late == {"__init__.py", "families.py", str(Path("transports", "__init__.py")), str(Path("cli", "main.py"))}
+    late = {path for path in SOURCES if words(path) & {"import_module", "__import__", "importlib"}}
+    places = ("__init__.py", "families.py", "transports/__init__.py", "sync/__init__.py", "cli/main.py")
+    assert late == {ROOT / place for place in places}
 
 
 @pytest.mark.parametrize("statement", ["import dobot_async", "from dobot_async import Magician, open_transport"])

@@ -1,0 +1,149 @@
+"""What is written by hand of arms, queues, batches and motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from dobot_async import Motion as AsyncMotion
+from dobot_async.sync.portal import PORTAL
+from dobot_async.sync.twin import Twin
+from dobot_async.wire import Command
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine
+
+    from dobot_async.sync.motion import Motion
+
+__all__ = ["ArmTwin", "BatchTwin", "MotionTwin", "QueueTwin", "motions"]
+
+Q = TypeVar("Q")
+
+
+class AsyncArm(Protocol):
+    """An arm, as far as its verbs are concerned."""
+
+    @property
+    def perform(self) -> Callable[[Command[Any, Any], Any, float | None], Coroutine[Any, Any, None]]:
+        """Does a command."""
+
+
+class AsyncQueue(Protocol):
+    """A queue, as far as its verbs are concerned."""
+
+    @property
+    def perform(self) -> Callable[[Command[Any, Any], Any, float | None], Coroutine[Any, Any, AsyncMotion]]:
+        """Queues a command."""
+
+
+class AsyncBatch(Protocol):
+    """A batch, as far as its verbs are concerned."""
+
+    @property
+    def perform(self) -> Callable[[Command[Any, Any], Any, float | None], AsyncMotion]:
+        """Adds a command."""
+
+
+A = TypeVar("A", bound=AsyncArm)
+B = TypeVar("B", bound=AsyncBatch)
+K = TypeVar("K", bound=AsyncQueue)
+
+
+def motions(found: Iterable[AsyncMotion]) -> list[Motion]:
+    """Return the twins of Motions."""
+    return [motion(each) for each in found]
+
+
+def motion(found: AsyncMotion) -> Motion:
+    """Return the twin of a Motion."""
+    from dobot_async.sync.motion import Motion  # noqa: PLC0415 - which is made of what is here
+
+    return Motion(found)
+
+
+class ArmTwin(Twin[A]):
+    """An arm: each verb returns when the arm has done it."""
+
+    __slots__ = ()
+
+    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> None:
+        """Do a command, and return when it is done."""
+        PORTAL.run(lambda: self.asynchronous.perform(command, value, timeout))
+
+    def perform_from_goal(self, plan: Any, needs: Any, timeout: float | None) -> None:
+        """Do what a plan makes of where the arm will be then."""
+        arm: Any = self.asynchronous
+        PORTAL.run(lambda: arm.perform_from_goal(plan, needs, timeout))
+
+
+class QueueTwin(Twin[K]):
+    """A queue: each verb returns a Motion once the arm has accepted it."""
+
+    __slots__ = ()
+
+    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Motion:
+        """Queue a command."""
+        return motion(PORTAL.run(lambda: self.asynchronous.perform(command, value, timeout)))
+
+    def perform_from_goal(self, plan: Any, needs: Any, timeout: float | None) -> Motion:
+        """Queue what a plan makes of where the arm will be then."""
+        queue: Any = self.asynchronous
+        return motion(PORTAL.run(lambda: queue.perform_from_goal(plan, needs, timeout)))
+
+
+class BatchTwin(Twin[B]):
+    """A batch: each verb returns its Motion, which can be waited for behind the batch's block.
+
+    Attributes:
+        motions: What was added.
+    """
+
+    __slots__ = ()
+
+    @property
+    def motions(self) -> list[Motion]:
+        """What was added."""
+        batch: Any = self.asynchronous
+        return motions(batch.motions)
+
+    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Motion:
+        """Add a command."""
+        return motion(PORTAL.look(lambda: self.asynchronous.perform(command, value, timeout)))
+
+    def perform_from_goal(self, plan: Any, needs: Any, timeout: float | None) -> Motion:
+        """Add what a plan makes of where the arm will be then."""
+        batch: Any = self.asynchronous
+        return motion(PORTAL.look(lambda: batch.perform_from_goal(plan, needs, timeout)))
+
+
+class MotionTwin(Twin[AsyncMotion]):
+    """A Motion.
+
+    Attributes:
+        name: Its command's.
+        moves: Whether it moves the arm.
+        index: The arm's number for it, None until the arm has accepted it.
+    """
+
+    __slots__ = ()
+
+    @property
+    def name(self) -> str:
+        """Its command's."""
+        return self.asynchronous.name
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves the arm."""
+        return self.asynchronous.moves
+
+    @property
+    def index(self) -> int | None:
+        """The arm's number for it, None until the arm has accepted it."""
+        return self.asynchronous.index
+
+    def __str__(self) -> str:
+        return str(self.asynchronous)
+
+    def __repr__(self) -> str:
+        return repr(self.asynchronous)

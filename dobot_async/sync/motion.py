@@ -1,0 +1,56 @@
+"""A queued command, for programs without asyncio.
+
+Written by tests/sync/generate.py: change what that reads, and run it again.
+"""
+
+from __future__ import annotations
+
+from dobot_async.errors import DobotError
+from dobot_async.sync.bases import MotionTwin
+from dobot_async.sync.portal import PORTAL
+
+__all__ = ["Motion"]
+
+
+class Motion(MotionTwin):
+    """One queued command; awaitable any number of times, by any number of tasks.
+
+    Awaiting it returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or
+    ConnectionLost when it has not. It belongs to its queue: cancelling who waits for it only ends the waiting.
+
+    Attributes:
+        entry: The command.
+        name: Its name.
+        moves: Whether it moves the arm.
+        index: The arm's number for it, None until the arm has accepted it.
+        call: What it was put with, None while it is in a batch whose block has not ended.
+        withdrawn: Whether nobody wants it any more.
+        accepted_or_ended: Set when the arm has taken it, or it has ended.
+    """
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended, well or not. Whoever looks again and again has the arm asked for a while each time."""
+        return PORTAL.look(lambda: self.asynchronous.done)
+
+    @property
+    def ended(self) -> bool:
+        """Whether it is known to have ended; asks nobody."""
+        return PORTAL.look(lambda: self.asynchronous.ended)
+
+    def exception(self) -> DobotError | None:
+        """Return how it failed, None if it was executed.
+
+        Raises:
+            asyncio.InvalidStateError: It has not ended yet.
+        """
+        return PORTAL.look(self.asynchronous.exception)
+
+    def wait(self, timeout: float | None = None) -> None:
+        """Wait as `await motion` does, for so many seconds at most.
+
+        Raises:
+            ReplyTimeout: It has not ended yet; it goes on.
+            RuntimeError: It is in a batch whose block has not ended, so that it was not sent.
+        """
+        PORTAL.run(lambda: self.asynchronous.wait(timeout))
