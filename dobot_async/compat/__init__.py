@@ -1,4 +1,4 @@
-"""Old blocking programs, with one import changed: the names and arguments of other libraries, on `dobot_async.sync`.
+r"""Old blocking programs, with one import changed: the names and arguments of other libraries, on `dobot_async.sync`.
 
     pydobot.Dobot, pydobotplus.Dobot   DobotDllType.SetPTPCmd, ...   dobotlab.magician
                   \                              |                       /

@@ -224,6 +224,7 @@ class Commands:
 
     async def finish(self) -> None:
         """End a jog, and return when all that was queued is executed; what does not run is not waited for."""
+        await self._arm.queue.update()  # which waits for a stop that goes on
         if self._jogging:
             await self.jog(STILL)
 

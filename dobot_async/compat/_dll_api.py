@@ -125,24 +125,24 @@ def SearchDobot(api: Api, maxLen: int = 1000) -> list[str]:
     return ports_with_arms()
 
 
-def ConnectDobot(api: Api, portName: str, baudrate: int = 115200) -> list[Any]:
+def ConnectDobot(api: Api, portName: str, baudrate: int = 115200) -> tuple[int, str, str]:
     """Connect to an arm: a port, an IP address, a URL, or "" for the first one. Its queue is emptied, and runs.
 
     Returns:
-        `[DobotConnect, "Dobot", version of the firmware]`. Why there is none is in the log.
+        `DobotConnect`, "Dobot", and the version of the firmware. Why there is none is in the log.
     """
     if api.connected:
         logger.warning("an arm is connected already: DisconnectDobot first, or take a library for each: load(name)")
-        return [DobotConnect.DobotConnect_Occupied, "", ""]
+        return DobotConnect.DobotConnect_Occupied, "", ""
 
     try:
         api.connect(portName)
     except ConnectFailed as error:
         logger.warning("%s", error)
         occupied = isinstance(error.__cause__, PermissionError | BlockingIOError) or "another" in str(error)
-        return [DobotConnect.DobotConnect_Occupied if occupied else DobotConnect.DobotConnect_NotFound, "", ""]
+        return DobotConnect.DobotConnect_Occupied if occupied else DobotConnect.DobotConnect_NotFound, "", ""
 
-    return [DobotConnect.DobotConnect_NoError, "Dobot", str(api.session.read(c.GET_DEVICE_VERSION))]
+    return DobotConnect.DobotConnect_NoError, "Dobot", str(api.session.read(c.GET_DEVICE_VERSION))
 
 
 def DisconnectDobot(api: Api) -> None:

@@ -5,8 +5,6 @@ What the vendor's file returns in a list is in a list here.
 
 from __future__ import annotations
 
-from typing import Any
-
 from dobot_async.compat._dll_api import Api
 from dobot_async.magician import commands as c
 
@@ -129,10 +127,10 @@ def GetKinematics(api: Api) -> list[float]:
     return [found.velocity, found.acceleration]
 
 
-def GetAlarmsState(api: Api, maxLen: int = 1000) -> list[Any]:
+def GetAlarmsState(api: Api, maxLen: int = 1000) -> tuple[bytes, int]:
     """Return 16 bytes, of which alarm n is bit n % 8 of byte n // 8, and their number."""
     bits = api.session.alarms()
-    return [bits, len(bits)]
+    return bits, len(bits)
 
 
 def ClearAllAlarmsState(api: Api) -> None:
@@ -162,8 +160,10 @@ def GetArmOrientation(api: Api) -> list[int]:
 
 def GetArmSpeedRatio(api: Api, paramsMode: int = 0) -> list[float]:
     """Return the percentage of velocity that jogs (0) or PTP motions (1) use, in a list."""
-    row = c.GET_PTP_COMMON_PARAMS if paramsMode else c.GET_JOG_COMMON_PARAMS
-    return [api.session.read(row).velocity_ratio]
+    if paramsMode:
+        return [api.session.read(c.GET_PTP_COMMON_PARAMS).velocity_ratio]
+
+    return [api.session.read(c.GET_JOG_COMMON_PARAMS).velocity_ratio]
 
 
 def SetArmSpeedRatio(api: Api, paramsMode: int, speedRatio: float, isQueued: int = 0) -> list[int]:

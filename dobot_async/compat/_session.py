@@ -1,9 +1,9 @@
 """One arm of an old program: calls from any thread, and an end that fits how the program ends.
 
-    close()                        waits for what was queued, raises what failed, leaves the arm
-    close() in except or finally   an error is being handled: the arm stops
-    Ctrl-C in a call               the arm stops, KeyboardInterrupt comes out
-    the program ends, not closed   as close(); after an error that nobody caught the arm stops
+close()                        waits for what was queued, raises what failed, leaves the arm
+close() in except or finally   an error is being handled: the arm stops
+Ctrl-C in a call               the arm stops, KeyboardInterrupt comes out
+the program ends, not closed   as close(); after an error that nobody caught the arm stops
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ import atexit
 import logging
 import sys
 import threading
-from collections.abc import Awaitable, Callable
-from contextlib import suppress
-from types import TracebackType
-from typing import Any, Self, TypeVar, overload
+from collections.abc import Awaitable, Callable, Generator
+from contextlib import contextmanager, suppress
+from typing import Any, TypeVar, overload
 
 from dobot_async import sync
 from dobot_async.compat._commands import Commands
@@ -62,7 +61,7 @@ class Session:
 
     def waiting(self) -> int:
         """Return how many commands are not known to be executed."""
-        return self.call(lambda: self._commands.waiting(), quiet=True)
+        return self.call(self._commands.waiting, quiet=True)
 
     @overload
     def read(self, row: Command[None, R]) -> R: ...
@@ -73,6 +72,14 @@ class Session:
     def read(self, row: Command[Any, R], value: Any = None) -> R:
         """Ask the arm."""
         return self.call(lambda: self._commands.read(row, value))
+
+    def input(self, address: int) -> int:
+        """Return the level of a digital input; raise ValueError if the pin is not configured as one."""
+        return int(self.call(lambda: self.arm.asynchronous.get_input(address)))
+
+    def analog(self, address: int) -> int:
+        """Return an analog input; raise ValueError if the pin is not configured as one."""
+        return self.call(lambda: self.arm.asynchronous.get_adc(address))
 
     def write(self, row: Command[Q, Any], value: Q) -> int:
         """Tell the arm something that it does at once; return 0."""
@@ -92,23 +99,23 @@ class Session:
 
     def current_index(self) -> int:
         """Return the index up to which everything is executed."""
-        return self.call(lambda: self._commands.current_index())
+        return self.call(self._commands.current_index)
 
     def start(self) -> None:
         """Let the queue run."""
-        self.call(lambda: self._commands.start())
+        self.call(self._commands.start)
 
     def halt(self) -> None:
         """Let the queue not run any further."""
-        self.call(lambda: self._commands.halt())
+        self.call(self._commands.halt)
 
     def clear(self) -> None:
         """Empty the queue."""
-        self.call(lambda: self._commands.clear())
+        self.call(self._commands.clear)
 
     def stop(self) -> None:
         """Stop the arm now; see `Commands.stop`."""
-        self.call(lambda: self._commands.stop(), quiet=True)
+        self.call(self._commands.stop, quiet=True)
 
     def jog(self, *, joint: bool, key: c.JOGKey) -> None:
         """Begin a jog, or end it with the idle key."""
@@ -117,16 +124,16 @@ class Session:
 
     def alarms(self) -> bytes:
         """Return the arm's 16 bytes of alarms."""
-        return self.call(lambda: self._commands.alarms(), quiet=True)
+        return self.call(self._commands.alarms, quiet=True)
 
     def clear_alarms(self) -> None:
         """Clear the alarms; raise a failure that nobody was told of yet."""
-        self.call(lambda: self._commands.clear_alarms(), quiet=True)
+        self.call(self._commands.clear_alarms, quiet=True)
         self.call(nothing)
 
     def home(self) -> None:
         """Home the arm, from an alarm as well; return when it is there."""
-        self.call(lambda: self._commands.home())
+        self.call(self._commands.home)
 
     def call(self, make: Callable[[], Awaitable[R]], *, quiet: bool = False) -> R:
         """Run something in the arms' thread; return what it returns.
@@ -172,13 +179,18 @@ class Session:
         """
         self._close(sys.exc_info()[1])
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def leave(self, error: BaseException | None) -> None:
+        """Close it, as `close` does; after an error stop the arm instead."""
         self._close(error)
+
+    @contextmanager
+    def opening(self) -> Generator[None]:
+        """Leave the arm if what is done in this block fails."""
+        try:
+            yield
+        except BaseException as error:
+            self._close(error)
+            raise
 
     def _close(self, error: BaseException | None) -> None:
         with self._lock:
@@ -187,7 +199,7 @@ class Session:
 
             try:
                 if error is None:
-                    self.call(lambda: self._commands.finish())
+                    self.call(self._commands.finish)
                     left = self.waiting()
                     if left:
                         logger.warning("%s: %d commands are left in a queue that was told not to run", self.url, left)
