@@ -6,7 +6,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from dobot_async import Motion as AsyncMotion
+from dobot_async._core.queue.stream import StreamStep
 from dobot_async.sync.portal import PORTAL
+from dobot_async.sync.streams import Stream, drawn
 from dobot_async.sync.twin import Twin
 from dobot_async.wire import Command
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["ArmTwin", "BatchTwin", "MotionTwin", "QueueTwin", "motions"]
 
 Q = TypeVar("Q")
+S = TypeVar("S", bound=StreamStep)
 
 
 class AsyncArm(Protocol):
@@ -90,6 +93,30 @@ class QueueTwin(Twin[K]):
         queue: Any = self.asynchronous
         return motion(PORTAL.run(lambda: queue.perform_from_goal(plan, needs, timeout)))
 
+    def stream(self, steps: Iterable[S]) -> Stream[S]:
+        """Queue steps as they come, as fast as the arm takes them; iterated over, it yields each one that is done.
+
+            arm.queue.stream(program).wait()
+            for step in arm.queue.stream(program): ...
+
+        The steps queued belong to the queue: who is interrupted, or leaves the loop, ends the queueing of further ones.
+        Verbs need no stream: each returns when the arm has accepted it.
+
+        Args:
+            steps: Objects with a `command` and its `value`. What is no list or tuple is drawn from in another thread,
+                as there is room.
+
+        Returns:
+            What does it: its `wait`, or iterating over it.
+
+        Raises:
+            ValueError: A step does not fit; those before it go on.
+            DobotError: As `put` and the Motions do. A note, and `steps`, name the step that failed, or the first and
+                the last one that may have.
+        """
+        queue: Any = self.asynchronous
+        return Stream(PORTAL.look(lambda: queue.stream(drawn(steps))))
+
 
 class BatchTwin(Twin[B]):
     """A batch: each verb returns its Motion, which can be waited for behind the batch's block.
@@ -117,30 +144,14 @@ class BatchTwin(Twin[B]):
 
 
 class MotionTwin(Twin[AsyncMotion]):
-    """A Motion.
-
-    Attributes:
-        name: Its command's.
-        moves: Whether it moves the arm.
-        index: The arm's number for it, None until the arm has accepted it.
-    """
+    """A Motion."""
 
     __slots__ = ()
 
     @property
-    def name(self) -> str:
-        """Its command's."""
-        return self.asynchronous.name
-
-    @property
-    def moves(self) -> bool:
-        """Whether it moves the arm."""
-        return self.asynchronous.moves
-
-    @property
-    def index(self) -> int | None:
-        """The arm's number for it, None until the arm has accepted it."""
-        return self.asynchronous.index
+    def done(self) -> bool:
+        """Whether it has ended, well or not. Whoever looks again and again has the arm asked for a while each time."""
+        return self.asynchronous.ended or PORTAL.look(lambda: self.asynchronous.done)
 
     def __str__(self) -> str:
         return str(self.asynchronous)

@@ -18,17 +18,17 @@ __all__ = ["Follow"]
 
 
 class Follow(Twin[AsyncFollow]):
-    """The arm follows `target` for the length of the block of `arm.following()`.
-
-    Attributes:
-        motion: All of it as one Motion: done when the block has ended well, and failed as soon as the following has.
-        sent: How many setpoints were sent.
-    """
+    """The arm follows `target` for the length of the block of `arm.following()`."""
 
     @property
     def motion(self) -> Motion:
-        """See the class."""
+        """All of it as one Motion: done when the block has ended well, and failed as soon as the following has."""
         return Motion(self.asynchronous.motion)
+
+    @property
+    def sent(self) -> int:
+        """How many setpoints were sent."""
+        return self.asynchronous.sent
 
     @property
     def target(self) -> Point | None:
@@ -41,7 +41,7 @@ class Follow(Twin[AsyncFollow]):
             TypeError: It is neither a pose nor numbers.
             DobotError: The following has failed, or was stopped.
         """
-        return PORTAL.look(lambda: self.asynchronous.target)
+        return self.asynchronous.target
 
     @target.setter
     def target(self, target: Any) -> None:
@@ -50,7 +50,7 @@ class Follow(Twin[AsyncFollow]):
     @property
     def joints(self) -> tuple[float, ...] | None:
         """The newest target, if it is in joints. Set it to one angle for each joint, degrees; see `target`."""
-        return PORTAL.look(lambda: self.asynchronous.joints)
+        return self.asynchronous.joints
 
     @joints.setter
     def joints(self, angles: Any) -> None:
@@ -59,7 +59,7 @@ class Follow(Twin[AsyncFollow]):
     @property
     def here(self) -> Point | None:
         """Where the arm was when it was last looked at, in coordinates."""
-        return PORTAL.look(lambda: self.asynchronous.here)
+        return self.asynchronous.here
 
     def play(self, points: Iterable[tuple[float, Any]], *, joints: bool = False) -> None:
         """Follow a trajectory; return when the arm is at its end.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Generic, TypeVar
 
+from dobot_async import ConnectionLost, LinkState, LinkStats
 from dobot_async import Link as AsyncLink
-from dobot_async import LinkState, LinkStats
+from dobot_async._core.util.hooks import Hooks
 from dobot_async.events import Events as AsyncEvents
 from dobot_async.events import Watched as AsyncWatched
 from dobot_async.sync.twin import Items, Twin, same
@@ -72,3 +73,18 @@ class Link(Twin[AsyncLink[Any]]):
     def events(self) -> Events[object]:
         """What happened unasked: frames that answered nothing, as `Unexpected`, and what the family adds."""
         return Events(self.asynchronous.events)
+
+    @property
+    def on_frame(self) -> Hooks[[bool, Any]]:
+        """Hooks, called with (outgoing, frame) for each frame, in the arms' thread: they must not wait for an arm."""
+        return self.asynchronous.on_frame
+
+    @property
+    def on_unsolicited(self) -> Hooks[[Any]]:
+        """Hooks, called with each frame that answered nothing, in the arms' thread."""
+        return self.asynchronous.on_unsolicited
+
+    @property
+    def on_lost(self) -> Hooks[[ConnectionLost]]:
+        """Hooks, called once with what every later call raises when the link is lost, in the arms' thread."""
+        return self.asynchronous.on_lost

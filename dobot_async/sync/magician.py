@@ -38,7 +38,7 @@ R = TypeVar("R")
 
 
 class Batch(BatchTwin[AsyncBatch], Verbs[Motion]):
-    """Commands that are sent together; each verb returns its Motion, which may be awaited after the batch's block."""
+    """Commands that are sent together; each verb returns its Motion, which may be waited for after the batch's block."""
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
         """Add any row of the table that may be queued."""
@@ -46,7 +46,7 @@ class Batch(BatchTwin[AsyncBatch], Verbs[Motion]):
 
 
 class Program(BatchTwin[AsyncProgram], Verbs[Motion]):
-    """Commands to be stored in the arm; nobody awaits their Motions."""
+    """Commands to be stored in the arm; nobody waits for their Motions."""
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
         """Add any row of the table that may be queued."""
@@ -54,13 +54,12 @@ class Program(BatchTwin[AsyncProgram], Verbs[Motion]):
 
 
 class MagicianQueue(QueueTwin[AsyncMagicianQueue], Verbs[Motion]):
-    """The arm's queue: each verb returns a Motion once the arm has accepted it, and waits while the queue is full.
+    """The arm's queue: each verb returns a Motion once the arm has accepted it, and waits while the queue is full."""
 
-    Attributes:
-        kinematics: The arm's geometry with its end effector.
-        declared: What the arm was told of its rail and its pins.
-        inherited: Whether an earlier program's commands may lie in the arm's queue.
-    """
+    @property
+    def kinematics(self) -> Kinematics:
+        """The arm's geometry with its end effector."""
+        return self.asynchronous.kinematics
 
     def stop(self, *, timeout: float = 5.0, tools: Literal["off", "leave"] = "off") -> None:
         """Stop the arm now, ahead of everything; all pending Motions raise MotionStopped, and the queue is empty.
@@ -148,7 +147,7 @@ class MagicianQueue(QueueTwin[AsyncMagicianQueue], Verbs[Motion]):
     @property
     def pending(self) -> int:
         """How many accepted commands are not known to have ended."""
-        return PORTAL.look(lambda: self.asynchronous.pending)
+        return self.asynchronous.pending
 
 
 class WiFi(Twin[AsyncWiFi]):
@@ -219,28 +218,22 @@ class WiFi(Twin[AsyncWiFi]):
 class Magician(ArmTwin[AsyncMagician], Verbs[None]):
     """A Dobot Magician; made by `connect`. Each verb returns when the arm has done it.
 
-    A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
-
-    Attributes:
-        link: The connection, with its state, events and figures.
-        queue: The arm's queue, with the same verbs.
-        following: Called for a block in which the arm follows a target: `with arm.following() as follow`.
-        wifi: Which network the arm joins, and whether it is in it.
+    A motion belongs to the call that waits for it: if that is cancelled, or its timeout passes, the arm stops.
     """
 
     @property
     def link(self) -> Link:
-        """See the class."""
+        """The connection, with its state, events and figures."""
         return Link(self.asynchronous.link)
 
     @property
     def queue(self) -> MagicianQueue:
-        """See the class."""
+        """The arm's queue, with the same verbs."""
         return MagicianQueue(self.asynchronous.queue)
 
     @property
     def wifi(self) -> WiFi:
-        """See the class."""
+        """Which network the arm joins, and whether it is in it."""
         return WiFi(self.asynchronous.wifi)
 
     @classmethod
@@ -304,7 +297,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
     @property
     def kinematics(self) -> Kinematics:
         """The arm's geometry with the end effector that it was told, or that it had when it was connected."""
-        return PORTAL.look(lambda: self.asynchronous.kinematics)
+        return self.asynchronous.kinematics
 
     def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
         """Sends any row of the command table immediately, and returns the arm's answer.

@@ -17,26 +17,17 @@ class Motion(MotionTwin):
 
     Awaiting it returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or
     ConnectionLost when it has not. It belongs to its queue: cancelling who waits for it only ends the waiting.
-
-    Attributes:
-        entry: The command.
-        name: Its name.
-        moves: Whether it moves the arm.
-        index: The arm's number for it, None until the arm has accepted it.
-        call: What it was put with, None while it is in a batch whose block has not ended.
-        withdrawn: Whether nobody wants it any more.
-        accepted_or_ended: Set when the arm has taken it, or it has ended.
     """
 
     @property
     def done(self) -> bool:
         """Whether it has ended, well or not. Whoever looks again and again has the arm asked for a while each time."""
-        return PORTAL.look(lambda: self.asynchronous.done)
+        return self.asynchronous.done
 
     @property
     def ended(self) -> bool:
         """Whether it is known to have ended; asks nobody."""
-        return PORTAL.look(lambda: self.asynchronous.ended)
+        return self.asynchronous.ended
 
     def exception(self) -> DobotError | None:
         """Return how it failed, None if it was executed.
@@ -47,7 +38,7 @@ class Motion(MotionTwin):
         return PORTAL.look(self.asynchronous.exception)
 
     def wait(self, timeout: float | None = None) -> None:
-        """Wait as `await motion` does, for so many seconds at most.
+        """Wait as `it` does, for so many seconds at most.
 
         Raises:
             ReplyTimeout: It has not ended yet; it goes on.

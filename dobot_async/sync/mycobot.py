@@ -37,12 +37,12 @@ R = TypeVar("R")
 
 
 class CobotBatch(BatchTwin[AsyncCobotBatch], Verbs[Motion]):
-    """Commands that are queued together; each verb returns its Motion, to be awaited after the batch's block."""
+    """Commands that are queued together; each verb returns its Motion, to be waited for after the batch's block."""
 
     @property
     def model(self) -> CobotModel:
         """What the arm is."""
-        return PORTAL.look(lambda: self.asynchronous.model)
+        return self.asynchronous.model
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
         """Add any row of the table that may be queued."""
@@ -55,7 +55,7 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
     @property
     def model(self) -> CobotModel:
         """What the arm is."""
-        return PORTAL.look(lambda: self.asynchronous.model)
+        return self.asynchronous.model
 
     def batch(self, *, timeout: float | None = None) -> AbstractContextManager[CobotBatch]:
         """Collect commands, and queue them with nothing between them when the block ends; an error sends none.
@@ -71,7 +71,7 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
     @property
     def unsent(self) -> int:
         """How many commands are here that the arm has never heard of."""
-        return PORTAL.look(lambda: self.asynchronous.unsent)
+        return self.asynchronous.unsent
 
     def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
         """Give one command to the arm's queue and return once the arm has accepted it.
@@ -132,34 +132,29 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
     @property
     def pending(self) -> int:
         """How many accepted commands are not known to have ended."""
-        return PORTAL.look(lambda: self.asynchronous.pending)
+        return self.asynchronous.pending
 
 
 class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
     """An arm behind a link; made by `connect`. Each verb returns when the arm has done it.
 
-    A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
-
-    Attributes:
-        link: The connection, with its state, events and figures.
-        queue: The queue of motions, with the same verbs. It is on this side, so it ends with the block.
-        following: Called for a block in which the arm follows a target: `with arm.following() as follow`.
+    A motion belongs to the call that waits for it: if that is cancelled, or its timeout passes, the arm stops.
     """
 
     @property
     def link(self) -> Link:
-        """See the class."""
+        """The connection, with its state, events and figures."""
         return Link(self.asynchronous.link)
 
     @property
     def queue(self) -> CobotQueue:
-        """See the class."""
+        """The queue of motions, with the same verbs. It is on this side, so it ends with the block."""
         return CobotQueue(self.asynchronous.queue)
 
     @property
     def model(self) -> CobotModel:
         """What the arm is: its joints, its limits, its rows of the command table."""
-        return PORTAL.look(lambda: self.asynchronous.model)
+        return self.asynchronous.model
 
     @classmethod
     def connect(

@@ -5,6 +5,7 @@ Written by tests/sync/generate.py: change what that reads, and run it again.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, Literal, Self, SupportsFloat, TypeVar
 
@@ -16,9 +17,11 @@ from dobot_async.sync.follow import Follow
 from dobot_async.sync.link import Link
 from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
+from dobot_async.sync.streams import GCodeRun
 from dobot_async.sync.twin import Block, same
 from dobot_async.ultraarm import commands as c
 from dobot_async.ultraarm.arm import UltraArm as AsyncUltraArm
+from dobot_async.ultraarm.gcode import Source
 from dobot_async.ultraarm.goals import Fault
 from dobot_async.ultraarm.jog import UltraArmJog
 from dobot_async.ultraarm.queue import UltraArmBatch as AsyncUltraArmBatch
@@ -33,7 +36,11 @@ R = TypeVar("R")
 
 
 class UltraArmBatch(BatchTwin[AsyncUltraArmBatch], Verbs[Motion]):
-    """Commands that are queued together; each verb returns its Motion, to be awaited after the batch's block."""
+    """Commands that are queued together; each verb returns its Motion, to be waited for after the batch's block."""
+
+    def __init__(self, asynchronous: AsyncUltraArmBatch) -> None:
+        super().__init__(asynchronous)
+        self.pump = asynchronous.pump
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
         """Add any row of the table that may be queued."""
@@ -42,6 +49,10 @@ class UltraArmBatch(BatchTwin[AsyncUltraArmBatch], Verbs[Motion]):
 
 class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
     """What is put here the arm is given in order, each once the one before it was seen to be done."""
+
+    def __init__(self, asynchronous: AsyncUltraArmQueue) -> None:
+        super().__init__(asynchronous)
+        self.pump = asynchronous.pump
 
     def batch(self, *, timeout: float | None = None) -> AbstractContextManager[UltraArmBatch]:
         """Collect commands, and queue them with nothing between them when the block ends; an error sends none.
@@ -57,7 +68,7 @@ class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
     @property
     def unsent(self) -> int:
         """How many commands are here that the arm has never heard of."""
-        return PORTAL.look(lambda: self.asynchronous.unsent)
+        return self.asynchronous.unsent
 
     def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
         """Give one command to the arm's queue and return once the arm has accepted it.
@@ -118,30 +129,33 @@ class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
     @property
     def pending(self) -> int:
         """How many accepted commands are not known to have ended."""
-        return PORTAL.look(lambda: self.asynchronous.pending)
+        return self.asynchronous.pending
 
 
 class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
     """An ultraArm P340; made by `connect`. Each verb returns when the arm has done it.
 
-    A command belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
-
-    Attributes:
-        link: The connection, with its state, events and figures.
-        queue: The queue of what it is to do, with the same verbs.
-        following: Called for a block in which the arm follows a target: `with arm.following() as follow`.
-        limits: What the arm may be told.
+    A command belongs to the call that waits for it: if that is cancelled, or its timeout passes, the arm stops.
     """
+
+    def __init__(self, asynchronous: AsyncUltraArm) -> None:
+        super().__init__(asynchronous)
+        self.pump = asynchronous.pump
 
     @property
     def link(self) -> Link:
-        """See the class."""
+        """The connection, with its state, events and figures."""
         return Link(self.asynchronous.link)
 
     @property
     def queue(self) -> UltraArmQueue:
-        """See the class."""
+        """The queue of what it is to do, with the same verbs."""
         return UltraArmQueue(self.asynchronous.queue)
+
+    @property
+    def limits(self) -> c.UltraArmLimits:
+        """What the arm may be told."""
+        return self.asynchronous.limits
 
     @classmethod
     def connect(
@@ -306,6 +320,37 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
             timeout: Seconds to wait until the arm is seen to stand; it is told again after that, too, until it does.
         """
         PORTAL.run(lambda: self.asynchronous.jog_stop(timeout=timeout))
+
+    def run_gcode(
+        self,
+        source: Source,
+        *,
+        dry_run: bool = False,
+        constant_speed: bool = False,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> GCodeRun:
+        """Check a G-code program as a whole, and return what runs it: call its `wait`, or iterate.
+
+            arm.run_gcode("part.gcode").wait()
+            for line in arm.run_gcode(lines): ...
+
+        Args:
+            source: A file's path, or lines.
+            dry_run: Only check: nothing is sent, and `wait` returns at once.
+            constant_speed: Run through it at constant speed, as the vendor's library does, and go back to ramps.
+            progress: Called with (done, all) whenever a line is done.
+
+        Raises:
+            ValueError: Lines are wrong, or lead beyond the limits; the message has each with its number.
+            OSError: The file cannot be read.
+        """
+        return GCodeRun(
+            PORTAL.look(
+                lambda: self.asynchronous.run_gcode(
+                    source, dry_run=dry_run, constant_speed=constant_speed, progress=progress
+                )
+            )
+        )
 
     def get_pose(self, *, timeout: float | None = None) -> c.UltraArmPose:
         """Return where the arm is: the tool, mm, and the joints, degrees, read at one time. Manual 5, M12 and M114."""

@@ -52,6 +52,9 @@ class Twin:
         verbs: What the verbs return in its place, "" where it has none.
         members: Its attributes that have twins, with those.
         calls: Its attributes that are called, each with the class that says how.
+        reads: Its other attributes, with their types.
+        copies: Attributes that its verbs look at.
+        about: What the class is, where the asynchronous one says it in words that do not fit.
         omit: What is written by hand, or is not there.
         base: What is written by hand of it.
     """
@@ -61,6 +64,9 @@ class Twin:
     verbs: str = ""
     members: dict[str, str] = field(default_factory=dict)
     calls: dict[str, str] = field(default_factory=dict)
+    reads: dict[str, str] = field(default_factory=dict)
+    copies: tuple[str, ...] = ()
+    about: str = ""
     omit: tuple[str, ...] = ()
     base: str = ""
 
@@ -92,13 +98,24 @@ class Page:
 
 ARM = {"link": "Link"}
 WRITTEN = ("stream",)
+MOTION = """One queued command; any number of threads may wait for it.
+
+`wait` returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or ConnectionLost when it
+has not. It belongs to its queue: interrupting who waits for it only ends the waiting."""
+
 PAGES: dict[str, Page] = {
     "magician": Page(
         "A Dobot Magician, for programs without asyncio.",
         (
             Twin("dobot_async.magician.queue:Batch", verbs="Motion", base="BatchTwin"),
             Twin("dobot_async.magician.queue:Program", verbs="Motion", base="BatchTwin"),
-            Twin("dobot_async.magician.queue:MagicianQueue", verbs="Motion", base="QueueTwin", omit=WRITTEN),
+            Twin(
+                "dobot_async.magician.queue:MagicianQueue",
+                verbs="Motion",
+                base="QueueTwin",
+                reads={"kinematics": "Kinematics"},
+                omit=WRITTEN,
+            ),
             Twin("dobot_async.magician.wifi:WiFi"),
             Twin(
                 "dobot_async:Magician",
@@ -126,15 +143,22 @@ PAGES: dict[str, Page] = {
     "ultraarm": Page(
         "An ultraArm P340, for programs without asyncio.",
         (
-            Twin("dobot_async.ultraarm.queue:UltraArmBatch", verbs="Motion", base="BatchTwin"),
-            Twin("dobot_async.ultraarm.queue:UltraArmQueue", verbs="Motion", base="QueueTwin", omit=WRITTEN),
+            Twin("dobot_async.ultraarm.queue:UltraArmBatch", verbs="Motion", base="BatchTwin", copies=("pump",)),
+            Twin(
+                "dobot_async.ultraarm.queue:UltraArmQueue",
+                verbs="Motion",
+                base="QueueTwin",
+                copies=("pump",),
+                omit=WRITTEN,
+            ),
             Twin(
                 "dobot_async:UltraArm",
                 verbs="None",
                 base="ArmTwin",
                 members={**ARM, "queue": "UltraArmQueue"},
                 calls={"following": "dobot_async.ultraarm.following:UltraArmFollowing"},
-                omit=("run_gcode",),
+                reads={"limits": "c.UltraArmLimits"},
+                copies=("pump",),
             ),
         ),
     ),
@@ -150,10 +174,20 @@ PAGES: dict[str, Page] = {
     ),
     "follow": Page(
         "What a program without asyncio holds while an arm follows a target.",
-        (Twin("dobot_async.following:Follow", members={"motion": "Motion"}, omit=("run", "begun", "close", "check")),),
+        (
+            Twin(
+                "dobot_async.following:Follow",
+                members={"motion": "Motion"},
+                reads={"sent": "int"},
+                omit=("run", "begun", "close", "check"),
+            ),
+        ),
     ),
 }
-BY_HAND = {"dobot_async:Link": ("link", "Link")}
+BY_HAND = {
+    "dobot_async:Link": ("link", "Link"),
+    "dobot_async.ultraarm.gcode:GCodeRun": ("streams", "GCodeRun"),
+}
 
 
 def homes() -> dict[type[Any], tuple[str, str]]:
@@ -246,11 +280,24 @@ class Writer:
             value = self.sync("motion", "Motion") if twin.verbs == "Motion" else "None"
             bases.append(f"{self.need(verbs.__module__, 'Verbs')}[{value}]")
 
-        lines = [f"class {twin.called}({', '.join(bases)}):", self.docstring(inspect.getdoc(kind) or "", twin.called)]
-        for name, of in twin.members.items():
-            value = self.sync(twin_homes()[of], of)
-            lines += ["", "    @property", f"    def {name}(self) -> {value}:", '        """See the class."""']
-            lines += [f"        return {value}(self.asynchronous.{name})"]
+        about, attributes = parted(inspect.getdoc(kind) or "")
+        lines = [f"class {twin.called}({', '.join(bases)}):", self.docstring(twin.about or about)]
+        if twin.copies:
+            lines += ["", f"    def __init__(self, asynchronous: {original}) -> None:"]
+            lines += ["        super().__init__(asynchronous)"]
+            lines += [f"        self.{name} = asynchronous.{name}" for name in twin.copies]
+
+        for name, of in (twin.members | twin.reads).items():
+            value = of
+            if name in twin.members:
+                value = self.sync(twin_homes()[of], of)
+            else:
+                self.expression(ast.parse(of, mode="eval").body, self.source(kind.__module__))
+
+            read = f"self.asynchronous.{name}"
+            lines += ["", "    @property", f"    def {name}(self) -> {value}:"]
+            lines += [self.docstring(attributes[name], "        ")]
+            lines += [f"        return {f'{value}({read})' if name in twin.members else read}"]
 
         for node, source in self.members(twin):
             lines += ["", *self.member(node, source, f"self.asynchronous.{node.name}", original, twin)]
@@ -273,7 +320,7 @@ class Writer:
 
     def members(self, twin: Twin) -> Iterator[tuple[ast.FunctionDef | ast.AsyncFunctionDef, Source]]:
         """The public methods of a class and of what it inherits, but for verbs, which are inherited as they are."""
-        seen = {*INTERNAL, *twin.omit, *twin.members, *twin.calls}
+        seen = {*INTERNAL, *twin.omit, *twin.members, *twin.calls, *twin.reads}
         for kind in twin.kind.__mro__:
             if not kind.__module__.startswith("dobot_async") or (twin.verbs and kind.__name__.endswith("Verbs")):
                 continue
@@ -313,7 +360,7 @@ class Writer:
         arguments = self.arguments(node.args, source)
         given = call_of(node.args)
         returned = self.returned(node, source, words, "property" in words, target, given, setter)
-        doc = self.docstring(ast.get_docstring(node) or "", twin.called, "        ")
+        doc = self.docstring(ast.get_docstring(node) or "", "        ")
         result = f" -> {returned[0]}" if returned[0] else ""
         return [*head, f"    def {name}({arguments}){result}:", *([doc] if doc else []), *returned[1]]
 
@@ -335,8 +382,12 @@ class Writer:
 
         assert node.returns, node.name
         kind, inner = self.kind_of(node, words)
+        if is_property:
+            text, wrap = self.type_of(inner, source)
+            return text, [f"        return {f'{wrap}({target})' if wrap else target}"]
+
         text, wrap = self.type_of(inner, source)
-        call = target if is_property else f"{target}({given})"
+        call = f"{target}({given})"
         if kind == "block":
             block, manager = self.sync("twin", "Block"), self.need("contextlib", "AbstractContextManager")
             wrap = "cls" if text == "Self" else wrap or self.sync("twin", "same")
@@ -443,7 +494,7 @@ class Writer:
             self.need(source.module.__name__, name)
 
     @staticmethod
-    def docstring(text: str, name: str, indent: str = "    ") -> str:
+    def docstring(text: str, indent: str = "    ") -> str:
         """A docstring, in the words of those who do not await."""
         for pattern, word in WORDS:
             text = re.sub(pattern, word, text)
@@ -461,8 +512,31 @@ WORDS = (
     (r"await (?=(arm|robot)\.)", ""),
     (r"async with ", "with "),
     (r"async for ", "for "),
+    (r"await motion", "it"),
+    (r"to be awaited( |\.)", r"to be waited for\1"),
+    (r"may be awaited", "may be waited for"),
+    (r"nobody awaits", "nobody waits for"),
+    (r"call that awaits it", "call that waits for it"),
+    (r"await it ", "wait for it "),
+    (
+        r" and return what runs it when it is awaited or iterated over",
+        " and return what runs it: call its `wait`, or iterate",
+    ),
+    (
+        r"return what runs it when it is awaited or iterated over",
+        "return what runs it: call its `wait`, or iterate over it",
+    ),
+    (r"awaiting it returns at once", "`wait` returns at once"),
+    (r"arm\.run_gcode\(\"part.gcode\"\)", 'arm.run_gcode("part.gcode").wait()'),
     (r"; made by `MyCobot\.connect`", "; made by `connect`"),
 )
+
+
+def parted(text: str) -> tuple[str, dict[str, str]]:
+    """A class's docstring without its attributes, and what it says of each of them."""
+    about, _, rest = text.partition("\n\nAttributes:\n")
+    attributes = re.findall(r"^ {4}(\w+): (.*(?:\n {8}.*)*)", rest, re.MULTILINE)
+    return about, {name: " ".join(said.split()) for name, said in attributes}
 
 
 def call_of(node: ast.arguments) -> str:
