@@ -1,7 +1,7 @@
 """The way of the imports, read from the source: layers know nothing of higher ones, and families not of each other.
 
 errors <- wire, util <- transports <- link <- queue <- following <- arms <- families <- discovery <- simulator
-<- toolpath, handling <- teaching <- sync <- cli <- __main__
+<- toolpath, handling <- teaching <- sync <- compat <- cli <- __main__
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ LAYERS = (
     ("toolpath", "handling"),
     ("teaching",),
     ("sync",),
+    ("compat",),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )

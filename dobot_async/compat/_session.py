@@ -52,7 +52,8 @@ class Session:
         self._commands = Commands(self.arm.asynchronous)
         self._open = True
         self._lock = threading.Lock()
-        atexit.register(self._end)  # after the first connection, so that it comes before the end of all connections
+        OPEN.add(self)
+        watch_the_end()
 
     @property
     def is_open(self) -> bool:
@@ -193,37 +194,71 @@ class Session:
             raise
 
     def _close(self, error: BaseException | None) -> None:
-        with self._lock:
-            if not self._open:
-                return
+        """Wait for what was queued unless there is an error, and leave the arm."""
+        if not self._open:
+            return
 
-            try:
-                if error is None:
-                    self.call(self._commands.finish)
-                    left = self.waiting()
-                    if left:
-                        logger.warning("%s: %d commands are left in a queue that was told not to run", self.url, left)
-            except BaseException as failure:
-                error = failure
-                raise
-            finally:
-                self._open = False
-                atexit.unregister(self._end)
-                self._leave(error)
+        try:
+            if error is None:
+                self.call(self._commands.finish)
+                if left := self.waiting():
+                    logger.warning("%s: %d commands are left in a queue that was told not to run", self.url, left)
+        except BaseException as failure:
+            error = failure
+            raise
+        finally:
+            self._leave(error)
 
     def _leave(self, error: BaseException | None) -> None:
-        """End the connection; after an error the arm is stopped."""
+        """End the connection, unless somebody else does; after an error the arm is stopped."""
+        with self._lock:
+            left, self._open = not self._open, False
+
+        if left:
+            return
+
+        OPEN.discard(self)
         if error is None:
             self._block.__exit__(None, None, None)
         else:
             self._block.__exit__(type(error), error, error.__traceback__)
 
-    def _end(self) -> None:
-        """The program ends, and has not closed this."""
+
+OPEN: set[Session] = set()
+"""What was not closed yet."""
+
+
+class Watch:
+    """Whether the end of the program is watched; see `watch_the_end`."""
+
+    begun = False
+
+
+def watch_the_end() -> None:
+    """Have what is open closed when the program ends.
+
+    Called after a connection is made, so that this comes before the connections' own end. Python waits for threads
+    before that: where the main thread ended by an error, their arms stop first.
+    """
+    if not Watch.begun:
+        Watch.begun = True
+        atexit.register(end)
+        before_threads = getattr(threading, "_register_atexit", None)  # what concurrent.futures uses
+        if before_threads:
+            before_threads(end, only_by_error=True)
+
+
+def end(*, only_by_error: bool = False) -> None:
+    """The program ends: stop the arms if that was by an error that nobody caught, else wait for what they do."""
+    error = getattr(sys, "last_value", None)
+    if only_by_error and error is None:
+        return
+
+    for session in list(OPEN):
         try:
-            self._close(getattr(sys, "last_value", None))
-        except DobotError as error:
-            logger.error("%s: %s", self.url, error)  # noqa: TRY400 - the traceback would be that of the interpreter's end
+            session.leave(error)
+        except DobotError as failure:
+            logger.error("%s: %s", session.url, failure)  # noqa: TRY400 - its traceback is that of the program's end
 
 
 async def nothing() -> None:

@@ -12,10 +12,10 @@ UP = 50
 
 
 def next_part():
-    for _ in range(40):
+    for _ in range(30):
         if magician.get_infrared_sensor(port=4)["status"] == 1:
             return True
-        magician.set_converyor(index=magician.Stepper1, enable=True, speed=500)
+        magician.set_converyor(index=magician.Stepper1, enable=True, speed=300)
         magician.wait(second=1)
         magician.set_converyor(index=magician.Stepper1, enable=False, speed=0)
     return False

@@ -15,7 +15,7 @@ MIDDLE = (250, 0)
 STOCK, STORE = [(230, 80), (230, 120), (190, 120)], [(190, 80), (190, 120), (150, 150)]
 ABOVE, DOWN = 20, -53.5
 
-free, full = queue.Queue(), queue.Queue()
+free, full, ended = queue.Queue(), queue.Queue(), queue.Queue()
 free.put("the middle is free")
 
 
@@ -48,9 +48,17 @@ def second():
     device.close()
 
 
-threads = [threading.Thread(target=first, daemon=True), threading.Thread(target=second, daemon=True)]
-for thread in threads:
-    thread.start()
-for thread in threads:
-    thread.join()
+def work(job):
+    try:
+        job()
+        ended.put(None)
+    except Exception as error:
+        ended.put(error)
+
+
+for job in (first, second):
+    threading.Thread(target=work, args=(job,), daemon=True).start()
+for _ in (first, second):
+    if error := ended.get():
+        raise error
 print("handed over", len(STOCK), "parts")
