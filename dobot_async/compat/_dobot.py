@@ -114,6 +114,26 @@ class BaseDobot(RawDobot):
         warnings.warn("go() is deprecated, use move_to() instead", DeprecationWarning, stacklevel=2)
         self._set_ptp_cmd(x, y, z, r, mode=c.PTPMode.MOVL_XYZ)
 
+    def move_rel(
+        self,
+        x: float = 0,
+        y: float = 0,
+        z: float = 0,
+        r: float = 0,
+        wait: bool = True,
+    ) -> None:
+        """Move by mm and degrees from where the arm stands now.
+
+        Args:
+            x: mm.
+            y: mm.
+            z: mm.
+            r: Degrees.
+            wait: Return when it is done, and not once the arm has accepted it.
+        """
+        here = self.get_pose().position
+        self._set_ptp_cmd(here.x + x, here.y + y, here.z + z, here.r + r, c.PTPMode.MOVJ_XYZ, wait)
+
     def go_arc(
         self, x: float, y: float, z: float, r: float, cir_x: float, cir_y: float, cir_z: float, cir_r: float
     ) -> int:

@@ -99,26 +99,6 @@ class Dobot(BaseDobot):
 
         return self._set_ptp_cmd(x, y, z, r, PTPMode.MOVJ_XYZ if mode is None else mode, wait)
 
-    def move_rel(
-        self,
-        x: float = 0,
-        y: float = 0,
-        z: float = 0,
-        r: float = 0,
-        wait: bool = True,
-    ) -> None:
-        """Move by mm and degrees from where the arm stands now.
-
-        Args:
-            x: mm.
-            y: mm.
-            z: mm.
-            r: Degrees.
-            wait: Return when it is done, and not once the arm has accepted it.
-        """
-        here = self.get_pose().position
-        self.move_to(here.x + x, here.y + y, here.z + z, here.r + r, wait)
-
     def speed(self, velocity: float = 100.0, acceleration: float = 100.0) -> None:
         """Set percentages and mm/s (mm/s²) from the same numbers; return when the arm has them."""
         self.wait_for_cmd(self._set_speed(velocity, acceleration))

