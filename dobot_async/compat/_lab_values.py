@@ -34,7 +34,7 @@ class Pose(PoseNumbers):
     __slots__ = ()
 
     def __getitem__(self, key: Any) -> Any:
-        return found(self._asdict(), self, key)
+        return found(self._asdict(), tuple(self), key)
 
     def get(self, name: str, default: float | None = None) -> Any:
         """Return what has a name, or something else if nothing has it."""
@@ -60,7 +60,7 @@ class Color(ColorNumbers):
     __slots__ = ()
 
     def __getitem__(self, key: Any) -> Any:
-        return found(self._asdict(), self, key)
+        return found(self._asdict(), tuple(self), key)
 
     def get(self, name: str, default: int | None = None) -> Any:
         """Return what has a name, or something else if nothing has it."""
