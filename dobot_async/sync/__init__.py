@@ -12,12 +12,14 @@ from importlib import import_module
 from typing import Any
 
 HOMES = {
+    "fleet": ("Fleet", "Member", "Together"),
     "follow": ("Follow",),
     "link": ("Link",),
     "magician": ("Magician",),
     "motion": ("Motion",),
     "mycobot": ("MyCobot",),
     "portal": ("run",),
+    "simulation": ("Simulation", "simulate"),
     "ultraarm": ("UltraArm",),
 }
 """The module of each name, which is imported when the name is first asked for."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from dobot_async import Motion as AsyncMotion
 from dobot_async._core.queue.stream import StreamStep
@@ -13,8 +13,6 @@ from dobot_async.sync.twin import Twin
 from dobot_async.wire import Command
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine
-
     from dobot_async.sync.motion import Motion
 
 __all__ = ["ArmTwin", "BatchTwin", "MotionTwin", "QueueTwin", "motions"]
@@ -23,33 +21,7 @@ Q = TypeVar("Q")
 S = TypeVar("S", bound=StreamStep)
 
 
-class AsyncArm(Protocol):
-    """An arm, as far as its verbs are concerned."""
-
-    @property
-    def perform(self) -> Callable[[Command[Any, Any], Any, float | None], Coroutine[Any, Any, None]]:
-        """Does a command."""
-
-
-class AsyncQueue(Protocol):
-    """A queue, as far as its verbs are concerned."""
-
-    @property
-    def perform(self) -> Callable[[Command[Any, Any], Any, float | None], Coroutine[Any, Any, AsyncMotion]]:
-        """Queues a command."""
-
-
-class AsyncBatch(Protocol):
-    """A batch, as far as its verbs are concerned."""
-
-    @property
-    def perform(self) -> Callable[[Command[Any, Any], Any, float | None], AsyncMotion]:
-        """Adds a command."""
-
-
-A = TypeVar("A", bound=AsyncArm)
-B = TypeVar("B", bound=AsyncBatch)
-K = TypeVar("K", bound=AsyncQueue)
+A = TypeVar("A")
 
 
 def motions(found: Iterable[AsyncMotion]) -> list[Motion]:
@@ -71,7 +43,8 @@ class ArmTwin(Twin[A]):
 
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> None:
         """Do a command, and return when it is done."""
-        PORTAL.run(lambda: self.asynchronous.perform(command, value, timeout))
+        arm: Any = self.asynchronous
+        PORTAL.run(lambda: arm.perform(command, value, timeout))
 
     def perform_from_goal(self, plan: Any, needs: Any, timeout: float | None) -> None:
         """Do what a plan makes of where the arm will be then."""
@@ -79,14 +52,15 @@ class ArmTwin(Twin[A]):
         PORTAL.run(lambda: arm.perform_from_goal(plan, needs, timeout))
 
 
-class QueueTwin(Twin[K]):
+class QueueTwin(Twin[A]):
     """A queue: each verb returns a Motion once the arm has accepted it."""
 
     __slots__ = ()
 
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Motion:
         """Queue a command."""
-        return motion(PORTAL.run(lambda: self.asynchronous.perform(command, value, timeout)))
+        queue: Any = self.asynchronous
+        return motion(PORTAL.run(lambda: queue.perform(command, value, timeout)))
 
     def perform_from_goal(self, plan: Any, needs: Any, timeout: float | None) -> Motion:
         """Queue what a plan makes of where the arm will be then."""
@@ -118,7 +92,7 @@ class QueueTwin(Twin[K]):
         return Stream(PORTAL.look(lambda: queue.stream(drawn(steps))))
 
 
-class BatchTwin(Twin[B]):
+class BatchTwin(Twin[A]):
     """A batch: each verb returns its Motion, which can be waited for behind the batch's block.
 
     Attributes:
@@ -135,7 +109,8 @@ class BatchTwin(Twin[B]):
 
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Motion:
         """Add a command."""
-        return motion(PORTAL.look(lambda: self.asynchronous.perform(command, value, timeout)))
+        batch: Any = self.asynchronous
+        return motion(PORTAL.look(lambda: batch.perform(command, value, timeout)))
 
     def perform_from_goal(self, plan: Any, needs: Any, timeout: float | None) -> Motion:
         """Add what a plan makes of where the arm will be then."""

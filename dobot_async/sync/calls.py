@@ -48,13 +48,14 @@ class Call(Generic[R]):
 
     Attributes:
         begun: Whether it runs, or has ended.
+        ended: Whether it has ended.
         error: What it raised.
     """
 
-    __slots__ = ("_done", "_interrupted", "_make", "_task", "begun", "error", "value")
+    __slots__ = ("_done", "_interrupted", "_make", "_task", "begun", "ended", "error", "value")
 
     def __init__(self, make: Callable[[], Awaitable[R]]) -> None:
-        self.begun = False
+        self.begun = self.ended = False
         self.error: BaseException | None = None
         self.value: R
         self._make = make
@@ -70,7 +71,7 @@ class Call(Generic[R]):
                 pass
         except BaseException as interruption:
             caller.loop.call_soon_threadsafe(caller.cancel, self)
-            if not self._done.acquire(timeout=PATIENCE):
+            if not (self.ended or self._done.acquire(timeout=PATIENCE)):
                 interruption.add_note("it is not known whether the arm stands: what it was told to do has not ended")
             elif self.error:
                 for note in getattr(self.error, "__notes__", ()):
@@ -103,7 +104,7 @@ class Call(Generic[R]):
                 self._task.uncancel()
 
             self._task = None
-            self._done.release()
+            self._end()
 
     def cancel(self) -> None:
         """Cancel it for who waits, in the loop."""
@@ -115,6 +116,10 @@ class Call(Generic[R]):
         """End it without having begun."""
         self.begun = True
         self.error = error
+        self._end()
+
+    def _end(self) -> None:
+        self.ended = True
         self._done.release()
 
 

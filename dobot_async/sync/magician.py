@@ -1,6 +1,6 @@
 """A Dobot Magician, for programs without asyncio.
 
-Written by tests/sync/generate.py: change what that reads, and run it again.
+Written by tests/sync/write_sync.py: change what that reads, and run it again.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ R = TypeVar("R")
 
 
 class Batch(BatchTwin[AsyncBatch], Verbs[Motion]):
-    """Commands that are sent together; each verb returns its Motion, which may be waited for after the batch's block."""
+    """Commands that are sent together; each verb returns its Motion, to be waited for after the batch's block."""
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
         """Add any row of the table that may be queued."""

@@ -1,6 +1,6 @@
 """A queued command, for programs without asyncio.
 
-Written by tests/sync/generate.py: change what that reads, and run it again.
+Written by tests/sync/write_sync.py: change what that reads, and run it again.
 """
 
 from __future__ import annotations
@@ -13,16 +13,26 @@ __all__ = ["Motion"]
 
 
 class Motion(MotionTwin):
-    """One queued command; awaitable any number of times, by any number of tasks.
+    """One queued command; any number of threads may wait for it.
 
-    Awaiting it returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or
-    ConnectionLost when it has not. It belongs to its queue: cancelling who waits for it only ends the waiting.
+    `wait` returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or ConnectionLost
+    when it has not. It belongs to its queue: interrupting who waits for it only ends the waiting.
     """
 
     @property
-    def done(self) -> bool:
-        """Whether it has ended, well or not. Whoever looks again and again has the arm asked for a while each time."""
-        return self.asynchronous.done
+    def name(self) -> str:
+        """Its name."""
+        return self.asynchronous.name
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves the arm."""
+        return self.asynchronous.moves
+
+    @property
+    def index(self) -> int | None:
+        """The arm's number for it, None until the arm has accepted it."""
+        return self.asynchronous.index
 
     @property
     def ended(self) -> bool:
@@ -38,7 +48,7 @@ class Motion(MotionTwin):
         return PORTAL.look(self.asynchronous.exception)
 
     def wait(self, timeout: float | None = None) -> None:
-        """Wait as `it` does, for so many seconds at most.
+        """Wait until it has ended, for so many seconds at most.
 
         Raises:
             ReplyTimeout: It has not ended yet; it goes on.

@@ -1,6 +1,6 @@
 """An arm of the myCobot family, for programs without asyncio.
 
-Written by tests/sync/generate.py: change what that reads, and run it again.
+Written by tests/sync/write_sync.py: change what that reads, and run it again.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import contextvars
 import logging
 import os
 import threading
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
 from typing import Protocol, TypeVar
 
@@ -88,7 +88,7 @@ class Portal:
             loop.call_soon_threadsafe(self._begin, loop, make)
 
     @contextmanager
-    def held(self) -> Iterator[None]:
+    def held(self) -> Generator[None, None, None]:
         """While this is entered, there is a thread."""
         self.hold()
         try:

@@ -34,7 +34,7 @@ class Twin(Generic[A]):
         self.asynchronous = asynchronous
 
     def __eq__(self, other: object) -> bool:
-        return self.asynchronous is (other.asynchronous if isinstance(other, Twin) else other)
+        return self.asynchronous is getattr(other, "asynchronous", other)
 
     def __hash__(self) -> int:
         return hash(id(self.asynchronous))

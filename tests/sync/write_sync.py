@@ -1,4 +1,4 @@
-"""Writes the blocking classes of `dobot_async.sync` out of the asynchronous ones: python tests/sync/generate.py
+"""Writes the blocking classes of `dobot_async.sync` out of the asynchronous ones: python tests/sync/write_sync.py
 
     class of the driver --> its public members, as they stand in the source
         async def f(...) -> R              def f(...) -> R                              waits
@@ -100,8 +100,8 @@ ARM = {"link": "Link"}
 WRITTEN = ("stream",)
 MOTION = """One queued command; any number of threads may wait for it.
 
-`wait` returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or ConnectionLost when it
-has not. It belongs to its queue: interrupting who waits for it only ends the waiting."""
+`wait` returns when the arm has executed it, and raises ArmAlarm, MotionStopped, MotionUnknown or ConnectionLost
+when it has not. It belongs to its queue: interrupting who waits for it only ends the waiting."""
 
 PAGES: dict[str, Page] = {
     "magician": Page(
@@ -168,7 +168,9 @@ PAGES: dict[str, Page] = {
             Twin(
                 "dobot_async:Motion",
                 base="MotionTwin",
-                omit=("accept", "end", "call", "withdrawn", "accepted_or_ended"),
+                about=MOTION,
+                reads={"name": "str", "moves": "bool", "index": "int | None"},
+                omit=("accept", "end", "done"),
             ),
         ),
     ),
@@ -199,6 +201,13 @@ def homes() -> dict[type[Any], tuple[str, str]]:
 def twin_homes() -> dict[str, str]:
     """The module of each twin, by its name."""
     return {name: page for page, name in homes().values()}
+
+
+def pages() -> Iterator[tuple[ModuleType, Twin]]:
+    """Each class that is written, with the module that it is in."""
+    for name, page in PAGES.items():
+        for twin in page.twins:
+            yield import_module(f"{PACKAGE}.{name}"), twin
 
 
 class Source:
@@ -237,7 +246,7 @@ class Writer:
         lines = [
             f'"""{about.about}',
             "",
-            'Written by tests/sync/generate.py: change what that reads, and run it again.\n"""',
+            'Written by tests/sync/write_sync.py: change what that reads, and run it again.\n"""',
             "",
         ]
         lines += ["from __future__ import annotations", ""]
@@ -512,9 +521,9 @@ WORDS = (
     (r"await (?=(arm|robot)\.)", ""),
     (r"async with ", "with "),
     (r"async for ", "for "),
-    (r"await motion", "it"),
+    (r"Wait as `await motion` does, for", "Wait until it has ended, for"),
     (r"to be awaited( |\.)", r"to be waited for\1"),
-    (r"may be awaited", "may be waited for"),
+    (r"which may be awaited", "to be waited for"),
     (r"nobody awaits", "nobody waits for"),
     (r"call that awaits it", "call that waits for it"),
     (r"await it ", "wait for it "),
@@ -551,7 +560,7 @@ def call_of(node: ast.arguments) -> str:
 def tidy(text: str, name: str) -> str:
     """The text as ruff has it."""
     path = ROOT / "dobot_async" / "sync" / f"{name}.py"
-    for command in (["check", "--fix-only", "--select", "I,RUF022,PYI,UP,D", "-q"], ["format", "-q"]):
+    for command in (["check", "--fix-only", "-q"], ["format", "-q"]):
         ruff = [sys.executable, "-m", "ruff", *command, "--stdin-filename", str(path), "-"]
         text = subprocess.run(ruff, input=text, capture_output=True, text=True, check=True, cwd=ROOT).stdout
 
