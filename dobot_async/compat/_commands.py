@@ -186,6 +186,12 @@ class Commands:
         self._forget()
         await self.halt()
 
+    async def interrupt(self) -> None:
+        """Stop the arm now, because the program is; its queue is empty then, and runs."""
+        self._forget()
+        self._halted = self._jogging = False
+        await self._arm.stop()
+
     async def jog(self, value: c.JOGCmd) -> None:
         """Begin or end a jog; it begins when what was queued is done, and ends at once."""
         ends = value.cmd is c.JOGKey.IDLE

@@ -19,8 +19,10 @@ from typing import Any, TypeVar, overload
 from dobot_async import sync
 from dobot_async.compat._commands import Commands
 from dobot_async.compat._ports import url_of
+from dobot_async.compat._signals import Signals
 from dobot_async.errors import ConnectionLost, DobotError
 from dobot_async.magician import commands as c
+from dobot_async.sync.portal import PORTAL
 from dobot_async.wire import Command
 
 __all__ = ["Session"]
@@ -48,7 +50,13 @@ class Session:
     def __init__(self, port: str | None = None) -> None:
         self.url = url_of(port)
         self._block = sync.Magician.connect(self.url)
-        self.arm: sync.Magician = self._block.__enter__()
+        SIGNALS.install()  # first, so that sync leaves them to this
+        try:
+            self.arm: sync.Magician = self._block.__enter__()
+        except BaseException:
+            handle_signals_while_open()
+            raise
+
         self._commands = Commands(self.arm.asynchronous)
         self._open = True
         self._lock = threading.Lock()
@@ -166,7 +174,7 @@ class Session:
             return sync.run(told)
         except Exception:
             raise
-        except BaseException:  # Ctrl-C: a program that catches it must not go on with an arm that moves
+        except BaseException:  # what else interrupts a call: a program that catches it must not go on with a moving arm
             with suppress(DobotError):
                 self.arm.stop(timeout=STOP)
 
@@ -218,14 +226,36 @@ class Session:
             return
 
         OPEN.discard(self)
-        if error is None:
-            self._block.__exit__(None, None, None)
-        else:
-            self._block.__exit__(type(error), error, error.__traceback__)
+        try:
+            if error is None:
+                self._block.__exit__(None, None, None)
+            else:
+                self._block.__exit__(type(error), error, error.__traceback__)
+        finally:
+            handle_signals_while_open()
+
+    def begin_stop(self) -> None:
+        """Begin to stop the arm, without waiting; for a signal's handler."""
+        PORTAL.begin(self._commands.interrupt)
 
 
 OPEN: set[Session] = set()
 """What was not closed yet."""
+
+
+def stop_all() -> None:
+    """Begin to stop all arms."""
+    for session in list(OPEN):
+        session.begin_stop()
+
+
+SIGNALS = Signals(stop_all)
+
+
+def handle_signals_while_open() -> None:
+    """Leave the signals to the system when no arm is connected any more."""
+    if not OPEN:
+        SIGNALS.restore()
 
 
 class Watch:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -320,6 +321,22 @@ def test_without_a_port_the_first_arm_on_usb_is_taken(monkeypatch: pytest.Monkey
         url_of("")
 
 
+def handlers() -> list[object]:
+    return [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+
+
+def test_signals_are_handled_while_an_arm_is_connected_alone() -> None:
+    before = handlers()
+    with pytest.raises(ConnectFailed):
+        pydobot.Dobot("tcp://127.0.0.1:1")
+
+    assert handlers() == before
+    with pydobot.Dobot("sim:?speed=100"):
+        assert handlers()[1] != before[1]
+
+    assert handlers() == before
+
+
 PROGRAM = """
 import sys
 from dobot_async.compat.pydobot import Dobot
@@ -327,6 +344,16 @@ device = Dobot(sys.argv[1])
 for y in range(5):
     device.move_to(220, y, 40, 0)
 {end}
+"""
+CODES = {"nothing": 0, "exit": 0, "caught": 0, "terminated": 128 + signal.SIGTERM}
+KILLED = """
+import os, signal, time
+device.wait(600_000)
+try:
+    os.kill(os.getpid(), signal.{signal})
+    time.sleep(100)
+except {error}:
+    device.pose()
 """
 THREAD = """
 import threading
@@ -340,6 +367,8 @@ ENDS: dict[str, tuple[str, Callable[[list[str]], bool]]] = {
     "exit": ("sys.exit()", lambda outcomes: outcomes == ["done"] * 5),
     "error": ("device.wait(600_000); 1 / 0", lambda outcomes: "done" not in outcomes[4:]),
     "interrupt": ("device.wait(600_000); raise KeyboardInterrupt", lambda outcomes: "done" not in outcomes[4:]),
+    "caught": (KILLED.format(signal="SIGINT", error="KeyboardInterrupt"), lambda outcomes: "done" not in outcomes[4:]),
+    "terminated": (KILLED.format(signal="SIGTERM", error="LookupError"), lambda outcomes: "done" not in outcomes[4:]),
     "thread": (
         THREAD,
         lambda outcomes: len(outcomes) < 1000,
@@ -361,7 +390,7 @@ async def test_a_program_that_does_not_close_ends_as_it_should(name: str) -> Non
             timeout=100,
             env=os.environ | {"PYTHONFAULTHANDLER": "1"},
         )
-        assert (ran.returncode == 0) == (name in {"nothing", "exit"}), ran.stderr
+        assert ran.returncode == CODES.get(name, 1), ran.stderr
 
     sim = await with_arm(program, speed=5)
     assert holds(outcomes(sim))
