@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, field
 from functools import partial
@@ -35,8 +35,6 @@ STOCK = [(230, -20), (230, 20), (270, -20), (270, 20), (230, -60), (230, 60)]
 STACKED = [(150, 120), (150, 150), (180, 120), (180, 150)]
 HANDED = [(230, 80), (230, 120), (190, 120)]
 BOXES = {"red": (120, -200), "green": (190, -150), "blue": (240, -60)}
-COLORS = ("blue", "red", "red")
-SMALL = (20.0, 20.0, 20.0)
 LONGEST = 120  # seconds that a program may take on a busy machine
 
 Sim = Simulation[SimulatedMagician]
@@ -149,10 +147,16 @@ def row() -> Scene:
     return Scene(pieces=[Piece(str(n), place) for n, place in enumerate(ROW)])
 
 
-def sorter(version: c.AccessoryVersion) -> Callable[[], Scene]:
-    """A belt with parts, the boxes for them, and the sensors, whose infrared one is of a version."""
+def sorter(version: c.AccessoryVersion, length: float, colors: Sequence[str]) -> Callable[[], Scene]:
+    """A belt with parts, the boxes for them, and the sensors, whose infrared one is of a version.
+
+    A belt that the program itself has to stop is stopped later the slower the computer is: its parts are longer.
+    """
     return lambda: Scene(
-        pieces=[Piece(f"{n} {color}", (200 - 35 * n, 120), SMALL, color) for n, color in enumerate(COLORS)],
+        pieces=[
+            Piece(f"{n} {color}", (200 - (length + 5) * n, 120), (length, 20, 20), color)
+            for n, color in enumerate(colors)
+        ],
         blocks=[Block(f"{color} box", place, (50, 50, 2)) for color, place in BOXES.items()],
         belts=[Belt("belt", (100, 120), (320, 50, 58.5))],
         sensors=[
@@ -162,7 +166,6 @@ def sorter(version: c.AccessoryVersion) -> Callable[[], Scene]:
     )
 
 
-SORTED = {"0 blue": "blue box", "1 red": "red box", "2 red": "1 red"}
 JOBS = {
     job.program: job
     for job in (
@@ -172,7 +175,12 @@ JOBS = {
             lambda: Scene(blocks=[Block("board", (230, 0), (100, 100, 38.5))]),
             (Mount(tool=PenTool()),),
         ),
-        Job("pydobotplus_conveyor_sorter.py", sorter(V1), speed=20, on=SORTED),
+        Job(
+            "pydobotplus_conveyor_sorter.py",
+            sorter(V1, 20, ("blue", "red", "red")),
+            speed=20,
+            on={"0 blue": "blue box", "1 red": "red box", "2 red": "1 red"},
+        ),
         Job(
             "pydobotplus_teach.py",
             lambda: Scene(pieces=[Piece("0", (250, 0))]),
@@ -205,7 +213,12 @@ JOBS = {
             lambda: Scene(pieces=[Piece(str(n), place) for n, place in enumerate(STOCK)]),
             places={str(n): (*STACKED[n % 4], -138 + n // 4 * 25) for n in range(6)},
         ),
-        Job("dobotlab_conveyor_sorter.py", sorter(V2), speed=10, on=SORTED),
+        Job(
+            "dobotlab_conveyor_sorter.py",
+            sorter(V2, 30, ("red", "blue")),
+            speed=10,
+            on={"0 red": "red box", "1 blue": "blue box"},
+        ),
     )
 }
 assert {job.program for job in JOBS.values()} == {path.name for path in EXAMPLES.glob("*.py")}

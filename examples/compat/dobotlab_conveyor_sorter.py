@@ -9,14 +9,15 @@ from dobot_async.compat.dobotlab import magician  # was: from DobotEDU import *
 
 BOXES = {"red": (120, -200, -10), "green": (190, -150, -10), "blue": (240, -60, -10)}
 UP = 50
+BELT = 100  # pulses/s: slow, for it is the program that stops the belt
 
 
 def next_part():
-    for _ in range(30):
+    for _ in range(22):
         if magician.get_infrared_sensor(port=4)["status"] == 1:
             return True
-        magician.set_converyor(index=magician.Stepper1, enable=True, speed=300)
-        magician.wait(second=1)
+        magician.set_converyor(index=magician.Stepper1, enable=True, speed=BELT)
+        magician.wait(second=3)
         magician.set_converyor(index=magician.Stepper1, enable=False, speed=0)
     return False
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 
@@ -80,8 +81,10 @@ async def test_ctrl_c_stops_the_arms(program: str) -> None:
 
 
 async def test_the_drawing_is_on_the_paper() -> None:
+    """pydobot cannot say that there is a pen, which is 1.3 mm longer than a cup."""
     ended = await run(JOBS["pydobot_drawing.py"])
     square, circle = ended.scene.drawing
-    corners = {(250, 20), (250, -20), (210, -20), (210, 20)}
-    assert corners <= {(round(x), round(y)) for x, y, _ in square}
-    assert all(abs(((x - 230) ** 2 + y**2) ** 0.5 - 15) < 0.5 for x, y, _ in circle)
+    for corner in ((250, 20), (250, -20), (210, -20), (210, 20)):
+        assert min(math.dist(corner, point[:2]) for point in square) < 2
+
+    assert all(13 < math.dist((230, 0), point[:2]) < 17 for point in circle)
