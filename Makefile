@@ -3,6 +3,7 @@
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
 # make format    what ruff can mend
+# make sync      writes the blocking classes out of the asynchronous ones again
 # make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|stops]
 # make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
@@ -11,7 +12,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all test-minimum check pytest format clean fuzz promises soak
+.PHONY: sync demo test test-all test-minimum check pytest format clean fuzz promises soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
@@ -22,6 +23,9 @@ check: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+sync: $(VENV)/.dev
+	$(BIN)/python tests/sync/write_sync.py
 
 format: $(VENV)/.dev
 	$(BIN)/ruff check --fix .

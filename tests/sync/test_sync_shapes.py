@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typed_program
 import write_sync
 
 import dobot_async
@@ -161,3 +162,7 @@ def test_the_names_of_the_stub_are_those_of_the_package() -> None:
     assert all(hasattr(sync, name) for name in names)
     with pytest.raises(AttributeError, match="nonsense"):
         getattr(sync, "nonsense")  # noqa: B009 - which type checkers would refuse
+
+
+def test_a_typed_program_runs() -> None:
+    typed_program.program()
