@@ -18,7 +18,7 @@ version = release = PROJECT["version"]
 description = PROJECT["description"]
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "dobot_docs"]
-exclude_patterns = ["_build", "_sphinx"]
+exclude_patterns = ["_sphinx"]
 root_doc = "index"
 default_role = "py:obj"
 add_module_names = False
