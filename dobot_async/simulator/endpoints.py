@@ -379,7 +379,11 @@ async def on_ble(simulation: Simulation, stack: AsyncExitStack, **details: Any) 
     if sys.platform != "linux":
         raise ValueError("ble is simulated by a BlueZ of its own, which only Linux can have")
 
-    from dobot_async.simulator import ble_rig  # noqa: PLC0415 - other systems have no D-Bus
+    try:
+        from dobot_async.simulator import ble_rig  # noqa: PLC0415 - other systems have no D-Bus
+    except ImportError as error:
+        message = f"{error.name} is not installed, and a simulated BLE module needs it: pip install 'dobot-async[ble-sim]'"
+        raise ImportError(message, name=error.name) from error
 
     return await ble_rig.serve(simulation, stack, **details)
 

@@ -53,7 +53,7 @@ class CommandTable(SphinxDirective):
         """Make one table for each group."""
         module = import_module(self.arguments[0])
         self.env.note_dependency(str(module.__file__))
-        models = getattr(import_module(self.options["models"]), "MODELS") if "models" in self.options else {}
+        models = import_module(self.options["models"]).MODELS if "models" in self.options else {}
         found: list[nodes.Node] = []
         group, body = None, nodes.tbody()
         for row in rows(module):
@@ -95,9 +95,9 @@ def layout_node(found: Described) -> nodes.paragraph:
     """The class of a value, which leads to its description, and how it lies on the wire."""
     paragraph = nodes.paragraph()
     if found.kind and found.kind is not bool:
-        reference = addnodes.pending_xref(
-            "", nodes.literal(text=found.kind.__name__), refdomain="py", reftype="class", reftarget=full_name(found.kind)
-        )
+        name = nodes.literal(text=found.kind.__name__)
+        target = full_name(found.kind)
+        reference = addnodes.pending_xref("", name, refdomain="py", reftype="class", reftarget=target)
         paragraph += [reference, nodes.Text(": ")]
 
     paragraph += nodes.Text(found.text or "nothing")

@@ -2,13 +2,14 @@
 
     ```{device-limits} mycobot280
     ```
+
+Units are those of the arm: degrees, and mm for x, y and z.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
-from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
@@ -55,9 +56,10 @@ class DeviceLimits(SphinxDirective):
         if name not in LIMITS:
             raise self.error(f"no arm {name!r}; there are: {', '.join(LIMITS)}")
 
-        head, *lines = [["Joint or axis", "Lowest", "Highest"], *[[word, *map(text, ends)] for word, ends in LIMITS[name]()]]
-        columns: list[Any] = [nodes.colspec(colwidth=width) for width in (40, 30, 30)]
-        return [nodes.table("", nodes.tgroup("", *columns, nodes.thead("", line(head)), nodes.tbody("", *map(line, lines)), cols=3))]
+        columns = [nodes.colspec(colwidth=width) for width in (40, 30, 30)]
+        head = nodes.thead("", line(["Joint or axis", "Lowest", "Highest"]))
+        body = nodes.tbody("", *[line([word, *map(text, ends)]) for word, ends in LIMITS[name]()])
+        return [nodes.table("", nodes.tgroup("", *columns, head, body, cols=3))]
 
 
 def text(number: float) -> str:

@@ -1,8 +1,9 @@
 """Docstrings of this package, made fit for reStructuredText.
 
-They are written for readers of the source: a block that is indented behind a blank line is code or a drawing, and a name
-between single backticks is a name, an ending such as in "`Motion`s" behind it or not. The first is told to docutils here,
-and so is the ending; the name is `default_role` in conf.py. And what the verbs return, `T` in the source, becomes what it stands for on the arm, on its queue, and in a batch.
+They are written for readers of the source: a block that is indented behind a blank line is code or a drawing, and a
+name between single backticks is a name, an ending such as in "`Motion`s" behind it or not. The first and the ending are
+told to docutils here; the name is `default_role` in conf.py. And what the verbs return, `T` in the source, becomes
+what it stands for on the arm, on its queue, and in a batch.
 """
 
 from __future__ import annotations

@@ -48,7 +48,9 @@ def written_about() -> Iterator[str]:
     for path in (ROOT / "README.md", *pages, *(ROOT / "examples").glob("*.py")):
         for module, name in IMPORT.findall(path.read_text(encoding="utf-8")):
             if "._" not in module:
-                yield f"{module}.{name}" if isinstance(getattr(import_module(module), name, None), ModuleType) else module
+                yield (
+                    f"{module}.{name}" if isinstance(getattr(import_module(module), name, None), ModuleType) else module
+                )
 
 
 @cache

@@ -1,7 +1,7 @@
 """The directives that describe the package's names.
 
-    ```{public-names} dobot_async            every name of a module that no other describes, of one kind if `:kind:` says
-    :kind: errors                            so; what else the module offers is listed below
+    ```{public-names} dobot_async            every name of a module that no other module describes, of one kind if
+    :kind: errors                            `:kind:` says so; what else it offers is listed below
     ```
     ```{held-class} Magician queue           the class of what a connected arm holds: its queue, or what that makes
     ```
@@ -9,6 +9,8 @@
     ```
     ```{examples}                            each program of examples/, with what it says of itself
     ```
+
+A new public name needs nothing here: it is described by its kind.
 """
 
 from __future__ import annotations
@@ -23,11 +25,11 @@ from functools import cache
 from importlib import import_module
 from typing import Any, ClassVar
 
-import dobot_async
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+import dobot_async
 from dobot_docs.names import ROOT, modules, owned_names, page_modules, shared_names
 
 __all__ = ["HELD", "KINDS", "kind_of", "register"]
@@ -74,6 +76,10 @@ HELD: Mapping[str, Callable[[Any], Any]] = {
 """What a connected arm holds, or makes for a block."""
 
 
+INSIDE = ("perform", "perform_from_goal", "greet", "leave")
+"""Methods by which the parts of an arm call each other."""
+
+
 def kind_of(value: object) -> str:
     """The kind of what a name stands for."""
     return next(kind for kind, fits in KINDS.items() if fits(value))
@@ -94,6 +100,7 @@ def entry(name: str, value: object) -> Iterator[str]:
         yield "   :members:"
         yield "   :undoc-members:"
         yield "   :inherited-members: BaseException, int, tuple, Enum"
+        yield f"   :exclude-members: {', '.join(INSIDE)}"
 
     yield ""
 
@@ -170,7 +177,7 @@ def held(arm: str) -> Mapping[str, type[Any]]:
                     continue
 
                 if hasattr(value, "__aenter__"):
-                    async with value as value:  # noqa: PLW2901 - what the block is given
+                    async with value as value:
                         found[word] = type(value)
                 else:
                     found[word] = type(value)

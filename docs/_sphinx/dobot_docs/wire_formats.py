@@ -77,7 +77,9 @@ def _(layout: cobot.Axis) -> Described:  # type: ignore[type-arg]
 @describe.register
 def _(layout: common.Lenient) -> Described:  # type: ignore[type-arg]
     inner = describe(layout.layout)
-    return inner._replace(text=f"{inner.text}; the arm needs the first {layout.least} bytes" if layout.least else inner.text)
+    return inner._replace(
+        text=f"{inner.text}; the arm needs the first {layout.least} bytes" if layout.least else inner.text
+    )
 
 
 @describe.register
@@ -127,7 +129,7 @@ def _(_: cobot_variants.ServoRegister) -> Described:
 
 
 @describe.register
-def _(layout: cobot_variants.PositionLayout) -> Described:
+def _(_: cobot_variants.PositionLayout) -> Described:
     return Described("values 4 to 7 × i16, position u8 (first on a myArm)", cobot_params.InPosition)
 
 
