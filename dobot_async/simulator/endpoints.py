@@ -382,7 +382,7 @@ async def on_ble(simulation: Simulation, stack: AsyncExitStack, **details: Any) 
     try:
         from dobot_async.simulator import ble_rig  # noqa: PLC0415 - other systems have no D-Bus
     except ImportError as error:
-        message = f"{error.name} is not installed, and a simulated BLE module needs it: pip install 'dobot-async[ble-sim]'"
+        message = f"{error.name} is not installed, and simulated BLE needs it: pip install 'dobot-async[ble-sim]'"
         raise ImportError(message, name=error.name) from error
 
     return await ble_rig.serve(simulation, stack, **details)

@@ -28,5 +28,5 @@ WORDS: Mapping[str, Sequence[str]] = {
     ),
     "drawing-with-preview": ("9 strokes on the paper, 9 in the file",),
     "two-arms": ("{'left': 220, 'right': 220}", "ArmAlarm: right:", "MotionStopped ended the left arm's wait"),
-    "data-logging": ("True 0", "seconds,x_mm,y_mm,z_mm", "LinkStats("),
+    "data-logging": ("enough readings: True", "seconds,x_mm,y_mm,z_mm", "LinkStats("),
 }

@@ -1,4 +1,4 @@
-"""What the package imports is what pyproject.toml declares, and nothing is declared for nothing: read from the source."""
+"""What the package imports is what pyproject.toml declares, and nothing is declared in vain: read from the source."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def imported(path: Path) -> Iterator[str]:
     """The top-level names that a file imports when it runs; what only type checkers read is left out."""
     unchecked = [ast.parse(path.read_text(encoding="utf-8"))]
     while unchecked:
-        node: ast.AST = unchecked.pop()  # type: ignore[assignment]
+        node: ast.AST = unchecked.pop()
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             unchecked += node.orelse  # type: ignore[arg-type]
             continue
