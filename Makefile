@@ -3,6 +3,9 @@
 # make test      ruff, mypy and the whole test suite
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
+# make docs      the site, in build/site, and what is promised of it; a warning is an error
+# make dist      sdist and wheel, in dist, as the package index will take them
+# make sbom      what the wheel brings with it, in build/sbom.cdx.json (CycloneDX)
 # make format    what ruff can mend
 # make sync      writes the blocking classes out of the asynchronous ones again
 # make lerobot   the contract tests of integrations/, with LeRobot but without what only its training needs
@@ -14,7 +17,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo panel sync lerobot test test-all test-minimum check pytest format clean fuzz promises soak
+.PHONY: demo panel sync lerobot test test-all test-minimum check pytest docs dist sbom format clean fuzz promises soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
@@ -63,6 +66,23 @@ test-minimum: .venv-minimum/.dev
 
 pytest: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto
+
+docs: $(VENV)/.dev
+	rm -rf build/site
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html -d build/doctrees docs build/site
+	DOBOT_SITE=build/site DOBOT_REQUIRE_SITE=1 $(BIN)/python -m pytest -q tests/docs/test_site.py
+
+dist: $(VENV)/.dev
+	rm -rf dist
+	$(BIN)/python -m build
+	$(BIN)/python -m twine check --strict dist/*
+
+EXTRAS := ble-sim,bridge,cli,draw,pytest,zenoh
+
+sbom: dist
+	$(PYTHON) -m venv --clear build/sbom
+	build/sbom/bin/python -m pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[$(EXTRAS)]"
+	$(BIN)/cyclonedx-py environment --pyproject pyproject.toml --output-file build/sbom.cdx.json build/sbom
 
 SEEDS ?= 10000
 FIRST ?= 0
