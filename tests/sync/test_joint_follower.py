@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from dobot_async import CommandRejected, ConnectFailed, DobotError
 from dobot_async.sync import Magician, MyCobot, Simulation, simulate
 from dobot_async.sync.joints import JointFollower, limits_of_cobot, limits_of_magician
+
+PATIENCE = 40.0  # seconds that an arm may take on a busy machine
 
 
 def follower(sim: Simulation[Any], **options: float) -> JointFollower[Magician]:
@@ -19,7 +22,8 @@ def follower(sim: Simulation[Any], **options: float) -> JointFollower[Magician]:
 
 def reach(arm: JointFollower[Magician] | JointFollower[MyCobot], joints: tuple[float, ...]) -> None:
     """Sends joints until they are reached."""
-    for _ in range(3000):
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
         sent = arm.go(joints)
         if math.dist(arm.joints(), sent) < 2:
             return

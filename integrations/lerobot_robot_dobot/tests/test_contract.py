@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ from dobot_async.sync import simulate
 TOOLS = [("suction", "SetEndEffectorSuctionCup"), ("gripper", "SetEndEffectorGripper")]
 NAMES = ["j1.pos", "j2.pos", "j3.pos", "j4.pos"]
 
+PATIENCE = 40.0  # seconds that an arm may take on a busy machine
+
 
 def robot(tmp_path: Path, url: str, **options: Any) -> Dobot:
     """A robot, made as LeRobot makes it."""
@@ -35,7 +38,8 @@ def until_it_fails(arm: Robot, action: dict[str, Any]) -> None:
 
 def reach(arm: Robot, action: dict[str, Any]) -> dict[str, Any]:
     """Sends an action until the arm is there; returns what was sent."""
-    for _ in range(3000):
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
         sent = arm.send_action(action)
         seen = arm.get_observation()
         if all(abs(seen[name] - sent[name]) < 1 for name in sent if name.startswith("j")):
