@@ -54,6 +54,7 @@ COMMANDS = {
     "write": ("dobot_async.cli.commands.drawing:write_line", "Write a text with a pen."),
     "teleop": ("dobot_async.cli.commands.teleop:teleop", "Lead the arm by keys, or by targets from a pipe."),
     "teach": ("dobot_async.cli.commands.teach:teach", "Teach the arm, and keep that in a file."),
+    "trace": ("dobot_async.cli.commands.traces:trace", "Look at a trace: lines, figures, curves."),
     "wifi": ("dobot_async.cli.commands.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
     "panel": ("dobot_async.cli.commands.panel:panel", "Show arms in the browser, and move them there."),
 }
@@ -152,7 +153,7 @@ def global_options() -> list[click.Option]:
             ["--trace"],
             type=click.Path(dir_okay=False, writable=True, allow_dash=True),
             metavar="FILE",
-            help="Write every frame to and from the arm to FILE, decoded, one JSON object a line; - is standard error.",
+            help="Record what goes over the connection into FILE, one JSON object a line; - is standard error.",
         ),
     ]
 

@@ -56,6 +56,9 @@ class Unwatched:
         """Do nothing."""
         yield
 
+    def note(self, motion: Motion) -> None:
+        """Do nothing."""
+
 
 @asynccontextmanager
 async def follow_target(

@@ -9,6 +9,8 @@ from contextlib import AbstractContextManager
 from typing import Any, Literal, Self, SupportsFloat, TypeVar
 
 from dobot_async._core.protocol.wire import Command
+from dobot_async._core.queue.motion import Motion
+from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.workspace import Workspace
 from dobot_async.arms.info import DeviceInfo
@@ -30,6 +32,7 @@ from dobot_async.sync.link import Link
 from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.twin import Block, Items, Twin, same
+from dobot_async.traces.recorder import Record
 
 __all__ = ["Batch", "Magician", "MagicianQueue", "Program", "WiFi"]
 
@@ -149,6 +152,15 @@ class MagicianQueue(QueueTwin[AsyncMagicianQueue], Verbs[Motion]):
         """How many accepted commands are not known to have ended."""
         return self.asynchronous.pending
 
+    @property
+    def on_motion(self) -> Hooks[[Motion]]:
+        """Hooks, called with each Motion when it was put, when the arm has accepted it, and when it has ended."""
+        return self.asynchronous.on_motion
+
+    def note(self, motion: Motion) -> None:
+        """Tell those who look on what has become of a Motion."""
+        PORTAL.look(lambda: self.asynchronous.note(motion))
+
 
 class WiFi(Twin[AsyncWiFi]):
     """An arm's Wi-Fi; `arm.wifi`. It needs the vendor's Wi-Fi module in the arm's serial socket."""
@@ -250,6 +262,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
         reconnect: bool = False,
         reply_timeout: float | tuple[float, float] = (0.02, 0.5),
         workspace: Workspace | Box | Cylinder | None = None,
+        record: Record | None = None,
     ) -> AbstractContextManager[Self]:
         """Connects to an arm for the length of a block.
 
@@ -272,6 +285,8 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
             workspace: Where the tool may be, in mm and the arm's own coordinates: a `Workspace`, or a Box or Cylinder
                 that is allowed. Targets, and ways as far as they are known, raise OutsideWorkspace, a ValueError,
                 before anything is sent; docs/workspace.md says what is looked at.
+            record: Where to write down what goes over the connection, for the length of the block: a path, or a
+                `dobot_async.traces.TraceFile`. Passwords are left out; see docs/trace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -289,6 +304,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
                 reconnect=reconnect,
                 reply_timeout=reply_timeout,
                 workspace=workspace,
+                record=record,
             ),
             cls,
             str(url),

@@ -10,6 +10,8 @@ from contextlib import AbstractContextManager
 from typing import Any, Literal, Self, SupportsFloat, TypeVar
 
 from dobot_async._core.protocol.wire import Command
+from dobot_async._core.queue.motion import Motion
+from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.workspace import Workspace
 from dobot_async.arms.info import DeviceInfo
@@ -29,6 +31,7 @@ from dobot_async.sync.link import Link
 from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.twin import Block, same
+from dobot_async.traces.recorder import Record
 
 __all__ = ["CobotBatch", "CobotQueue", "MyCobot"]
 
@@ -134,6 +137,15 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
         """How many accepted commands are not known to have ended."""
         return self.asynchronous.pending
 
+    @property
+    def on_motion(self) -> Hooks[[Motion]]:
+        """Hooks, called with each Motion when it was put, when the arm has accepted it, and when it has ended."""
+        return self.asynchronous.on_motion
+
+    def note(self, motion: Motion) -> None:
+        """Tell those who look on what has become of a Motion."""
+        PORTAL.look(lambda: self.asynchronous.note(motion))
+
 
 class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
     """An arm behind a link; made by `connect`. Each verb returns when the arm has done it.
@@ -173,6 +185,7 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         limits: Mapping[str, Range] | None = None,
         gap: float = 0.02,
         workspace: Workspace | Box | Cylinder | None = None,
+        record: Record | None = None,
     ) -> AbstractContextManager[Self]:
         """Connect to an arm for the length of a block.
 
@@ -201,6 +214,8 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
                 Cylinder that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is
                 sent, or CommandRejected where it shows when its turn comes. Motions given in joints are not looked at;
                 see docs/workspace.md.
+            record: Where to write down what goes over the connection, for the length of the block: a path, or a
+                `dobot_async.traces.TraceFile`. Passwords are left out; see docs/trace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -223,6 +238,7 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
                 limits=limits,
                 gap=gap,
                 workspace=workspace,
+                record=record,
             ),
             cls,
             str(url),

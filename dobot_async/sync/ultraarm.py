@@ -10,6 +10,8 @@ from contextlib import AbstractContextManager
 from typing import Any, Literal, Self, SupportsFloat, TypeVar
 
 from dobot_async._core.protocol.wire import Command
+from dobot_async._core.queue.motion import Motion
+from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.workspace import Workspace
 from dobot_async.arms.info import DeviceInfo
@@ -28,6 +30,7 @@ from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.streams import GCodeRun
 from dobot_async.sync.twin import Block, same
+from dobot_async.traces.recorder import Record
 
 __all__ = ["UltraArm", "UltraArmBatch", "UltraArmQueue"]
 
@@ -131,6 +134,15 @@ class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
         """How many accepted commands are not known to have ended."""
         return self.asynchronous.pending
 
+    @property
+    def on_motion(self) -> Hooks[[Motion]]:
+        """Hooks, called with each Motion when it was put, when the arm has accepted it, and when it has ended."""
+        return self.asynchronous.on_motion
+
+    def note(self, motion: Motion) -> None:
+        """Tell those who look on what has become of a Motion."""
+        PORTAL.look(lambda: self.asynchronous.note(motion))
+
 
 class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
     """An ultraArm P340; made by `connect`. Each verb returns when the arm has done it.
@@ -174,6 +186,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
         home_switches: tuple[int, int, int] | None = (1, 1, 1),
         on_stop: Literal["release", "finish"] = "release",
         workspace: Workspace | Box | Cylinder | None = None,
+        record: Record | None = None,
     ) -> AbstractContextManager[Self]:
         """Connect to an arm for the length of a block.
 
@@ -203,6 +216,8 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
                 that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is sent, or
                 CommandRejected where it shows when its turn comes. Motions given in joints are not looked at; see
                 docs/workspace.md.
+            record: Where to write down what goes over the connection, for the length of the block: a path, or a
+                `dobot_async.traces.TraceFile`. Passwords are left out; see docs/trace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -223,6 +238,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
                 home_switches=home_switches,
                 on_stop=on_stop,
                 workspace=workspace,
+                record=record,
             ),
             cls,
             str(url),

@@ -22,7 +22,7 @@ from dobot_async._core.link.connection import Reopen
 from dobot_async._core.link.correlator import Outcome
 from dobot_async._core.link.exchange import Exchange
 from dobot_async._core.link.round_trip import RoundTrip
-from dobot_async._core.protocol.contract import Encoder, Frame, LinkState, LinkStats, Parser, Unexpected
+from dobot_async._core.protocol.contract import Encoder, Frame, LineLimits, LinkState, LinkStats, Parser, Unexpected
 from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.protocol.wire import Command
 from dobot_async._core.util.events import Events
@@ -57,6 +57,7 @@ class Link(Exchange[F]):
         heard_at: When the last frame came, in the loop's seconds.
         events: What happened unasked: frames that answered nothing, as `Unexpected`, and what the family adds.
         on_frame: Hooks, called with (outgoing, frame) for each frame.
+        on_data: Hooks, called with the bytes that have arrived, behind `on_frame` for the frames in them.
         on_unsolicited: Hooks, called with each frame that answered nothing.
         on_lost: Hooks, called once with what every later call raises when the link is lost and not reopened.
         cleanup: What still has to be done to the arm, until the link ends.
@@ -78,6 +79,7 @@ class Link(Exchange[F]):
         super().__init__(transport, url, reopen, barriers=barriers, filler=filler, round_trip=round_trip or RoundTrip())
         self.events: Events[object] = Events()
         self.on_frame: Hooks[[bool, F]] = Hooks()
+        self.on_data: Hooks[[bytes]] = Hooks()
         self.on_unsolicited: Hooks[[F]] = Hooks()
         self.on_lost: Hooks[[ConnectionLost]] = Hooks()
         self.cleanup = Cleanup(self.url)
@@ -91,6 +93,12 @@ class Link(Exchange[F]):
     def reorder_window(self) -> float:
         """Seconds within which messages of this link may overtake one another, and a doubled one arrive again."""
         return self._correlator.reorder_window
+
+    @property
+    def limits(self) -> LineLimits:
+        """What the transport can carry at a time; it may change when the link is reopened."""
+        transport = self._transport
+        return LineLimits(transport.in_flight, transport.window, transport.reorder_window)
 
     @property
     def stats(self) -> LinkStats:
@@ -246,6 +254,8 @@ class Link(Exchange[F]):
         """Take the next bytes of the line."""
         self._arrived_at = self._loop.time()
         self._receive(self._parser.feed(data))
+        if self.on_data:
+            self.on_data(data)
 
     def _receive(self, frames: list[F]) -> None:
         """Hand frames to those who wait for them."""

@@ -9,7 +9,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from dobot_async._core.protocol.wire import Command
 
-__all__ = ["Encoder", "Frame", "LinkState", "LinkStats", "Parser", "Unexpected"]
+__all__ = ["Encoder", "Frame", "LineLimits", "LinkState", "LinkStats", "Parser", "Unexpected"]
 
 
 class Frame(Protocol):
@@ -72,6 +72,21 @@ class Unexpected(Generic[F]):
     """A frame that nobody waited for: a copy, of another client, or of no request at all."""
 
     frame: F
+
+
+@dataclass(frozen=True, slots=True)
+class LineLimits:
+    """What a transport can carry at a time; see `transports.base.Transport`.
+
+    Attributes:
+        in_flight: Requests that may be unanswered.
+        window: Queued commands that may be unacknowledged.
+        reorder_window: Seconds within which messages may overtake one another.
+    """
+
+    in_flight: int
+    window: int
+    reorder_window: float
 
 
 @dataclass(slots=True)

@@ -22,6 +22,7 @@ from dobot_async._core.queue.motion import Motion, Outbox
 from dobot_async._core.queue.poller import StatusPoller
 from dobot_async._core.queue.stopper import Stopper
 from dobot_async._core.queue.writer import Writer
+from dobot_async._core.util.hooks import Hooks
 from dobot_async.errors import (
     ArmAlarm,
     CommandRejected,
@@ -130,6 +131,16 @@ class QueueCore:
     def watching(self) -> AbstractContextManager[None]:
         """While this is entered, the arm is asked how far it is."""
         return self._poller.watching()
+
+    @property
+    def on_motion(self) -> Hooks[[Motion]]:
+        """Hooks, called with each Motion when it was put, when the arm has accepted it, and when it has ended."""
+        return self._executor.on_motion
+
+    def note(self, motion: Motion) -> None:
+        """Tell those who look on what has become of a Motion."""
+        if self.on_motion:
+            self.on_motion(motion)
 
     def roaming(self) -> AbstractAsyncContextManager[None]:
         """While this is entered, the arm may go anywhere; in a fleet it waits until it may."""
@@ -276,5 +287,6 @@ class QueueCore:
 
     def _accepted(self, motion: Motion) -> None:
         """The arm has taken a command."""
+        self.note(motion)
         self._pending.append(motion)
         self._poller.watch()

@@ -25,6 +25,9 @@ class Watcher(Protocol):
         """While this is entered, the arm is asked how far it is."""
         ...
 
+    def note(self, motion: Motion) -> None:
+        """Tell those who look on what has become of a Motion."""
+
 
 class Motion:
     """One queued command; awaitable any number of times, by any number of tasks.
@@ -120,6 +123,7 @@ class Motion:
             self._error = error
             self._ended.set()
             self.accepted_or_ended.set()
+            self._queue.note(self)
 
 
 LOOKED_AT = 1.0

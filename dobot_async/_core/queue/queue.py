@@ -91,6 +91,7 @@ class MotionQueue(QueueCore):
         timeout, call, epoch = check_timeout(timeout), object(), epoch or self.epoch
         for motion in motions:
             motion.call = call
+            self.note(motion)
 
         await self._keep(motions)
         self._check_free(motions, epoch)
