@@ -3,7 +3,7 @@
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
 # make format    what ruff can mend
-# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|stops]
+# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|lost|stops]
 # make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 
