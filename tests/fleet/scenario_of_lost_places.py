@@ -207,7 +207,13 @@ async def run(seed: int, say: Callable[[str], None]) -> Figures:
     random, loop = Random(seed), asyncio.get_running_loop()
     names = "abc"[: random.randint(2, 3)]
     stands = {
-        name: Stand(*(random.uniform(-20, 20) for _ in range(4)), random.choice([None, None, 90.0, -60.0]))
+        name: Stand(
+            random.uniform(-20, 20),
+            random.uniform(-20, 20),
+            random.uniform(-20, 20),
+            random.uniform(-20, 20),
+            random.choice([None, None, 90.0, -60.0]),
+        )
         for name in names
     }
     zones: dict[str, tuple[Zone, Box | Cylinder]] = {}
