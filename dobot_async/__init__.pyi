@@ -32,7 +32,8 @@ from dobot_async.arms.mycobot.params import Coords, EndType, GripperType, MoveMo
 from dobot_async.arms.mycobot.pose import CobotPose
 from dobot_async.arms.mycobot.readings import CobotInfo
 from dobot_async.arms.ultraarm.arm import UltraArm, UltraArmJog
-from dobot_async.arms.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmLimits, UltraArmPose
+from dobot_async.arms.ultraarm.limits import UltraArmLimits
+from dobot_async.arms.ultraarm.params import UltraArmAngles, UltraArmCoords, UltraArmPose
 from dobot_async.discovery import DiscoveryProblem, Found, discover
 from dobot_async.errors import (
     ArmAlarm,

@@ -182,6 +182,14 @@ def check_palletise(output: str) -> None:
     assert [line.partition(",")[0] for line in output.splitlines()] == ["stacks a part"] * 4 + ["puts back a part"] * 2
 
 
+def check_sync_pick_and_place(output: str) -> None:
+    assert [numbers(line) for line in output.splitlines()] == [[1], [2], [3]]
+
+
+def check_sync_two_arms(output: str) -> None:
+    assert [numbers(line) for line in output.splitlines()] == [[200], [200]]
+
+
 CHECKS: dict[str, Callable[[str], None]] = {
     "connect_and_read.py": check_connect_and_read,
     "pick_and_place.py": check_pick_and_place,
@@ -204,6 +212,8 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "follow_target.py": check_follow_target,
     "teach_and_play.py": check_teach_and_play,
     "palletise.py": check_palletise,
+    "sync_pick_and_place.py": check_sync_pick_and_place,
+    "sync_two_arms.py": check_sync_two_arms,
 }
 
 

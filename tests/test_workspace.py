@@ -37,7 +37,7 @@ from dobot_async.arms.mycobot import commands as mycobot
 from dobot_async.arms.ultraarm import commands as ultraarm
 from dobot_async.fleet import Member
 from dobot_async.simulator import DeviceOptions, Simulation, simulate
-from dobot_async.simulator.ultraarm.body import forward
+from dobot_async.simulator.ultraarm.kinematics import forward
 
 XYZ = tuple[float, float, float]
 NEAR = 0.2  # mm by which a way between two places that are looked at may be off

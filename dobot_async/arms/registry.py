@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 __all__ = ["REGISTERED", "Each", "Family", "Parts", "homes"]
 
@@ -98,8 +98,8 @@ def families() -> Iterator[tuple[str, Family]]:
 def found(family: Family, part: str, word: str) -> Any:
     """A part of a family."""
     module, _, name = getattr(family, part).partition(":")
-    value = getattr(import_module(module), name)
-    return value[word] if isinstance(value, Mapping) else value
+    value: Any = getattr(import_module(module), name)
+    return cast("Mapping[str, Any]", value)[word] if isinstance(value, Mapping) else value
 
 
 def homes() -> dict[str, str]:

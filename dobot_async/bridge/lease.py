@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import operator
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Generic, Literal, TypeVar
@@ -110,7 +109,9 @@ class Lease(Generic[F]):
         for attempt in itertools.count():
             frames = [*(family.stopping if attempt < GENTLY else family.insisting), *off]
             answered = await self._line.stop(frames)
-            told = attempt > GENTLY or all(map(operator.or_, answered, map(family.may_be_silent, frames)))
+            told = attempt > GENTLY or all(
+                heard or family.may_be_silent(frame) for heard, frame in zip(answered, frames, strict=True)
+            )
             obeys = answered[0] if family.proves_stop else await self._is_seen_to_stand(holder, frames, answered)
             if final and obeys and told:
                 self._tell("stopped", holder, "it has gone, and the arm was in motion")

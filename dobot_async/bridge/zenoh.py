@@ -282,7 +282,7 @@ def introduction(query: zenoh.Query) -> str | None:
     """What a client calls itself, for people; None if it speaks another version."""
     payload = query.payload.to_bytes() if query.payload else b""
     with suppress(ValueError, AttributeError, RecursionError):
-        told = json.loads(payload) if len(payload) <= LONGEST_INTRODUCTION else {}
+        told: Any = json.loads(payload) if len(payload) <= LONGEST_INTRODUCTION else {}
         if told.get("version") == VERSION:
             return printable(str(told.get("who", "")), LONGEST_NAME)
 

@@ -13,7 +13,7 @@ from dobot_async.arms.magician.kinematics import Kinematics
 from dobot_async.arms.magician.params import EndEffectorParams
 from dobot_async.arms.mycobot.models import model_of
 from dobot_async.arms.ultraarm.arm import UltraArm
-from dobot_async.arms.ultraarm.params import MANUAL_LIMITS
+from dobot_async.arms.ultraarm.limits import MANUAL_LIMITS
 from dobot_async.cli.drawing_options import Begin
 from dobot_async.cli.failures import StepRefused, WrongFile
 from dobot_async.cli.session import Session

@@ -139,7 +139,7 @@ def connect_options(family: str, kind: type[Any], table: Mapping[str, Any]) -> d
     if model is not None and model not in words:
         raise ValueError(f"model: one of {', '.join(words[1:])}, not {model!r}")
 
-    given = {**defaults, **found}
+    given: dict[str, Any] = {**defaults, **found}
     check_options(given["queue"], given["on_error"], given["timeout"], given["reply_timeout"])
     return found
 
@@ -259,17 +259,18 @@ def known(table: Mapping[str, Any], names: Collection[str], what: str) -> None:
 
 def tables(value: Any, name: str) -> Mapping[str, Mapping[str, Any]]:
     """A table of tables."""
-    if not isinstance(value, dict) or not all(isinstance(each, dict) for each in value.values()):
+    found: dict[str, Any] = value if isinstance(value, dict) else {"": value}
+    if not all(isinstance(each, dict) for each in found.values()):
         raise ValueError(f"{name}: expected tables, such as [{name}.NAME]")
 
-    return value
+    return found
 
 
 def sub(table: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """A table in a table; empty if it is not there."""
     value = table.get(name, {})
     if isinstance(value, dict):
-        return value
+        return cast("dict[str, Any]", value)
 
     raise ValueError(f"{name}: expected a table, such as {name} = {{ ... }}, not {value!r}")
 
@@ -297,7 +298,7 @@ def number(table: Mapping[str, Any], name: str, default: float | None = None) ->
 
 def span(table: Mapping[str, Any], name: str) -> tuple[float, float]:
     """Two numbers."""
-    value = table[name]
+    value: list[Any] = table[name]
     if not isinstance(value, list) or len(value) != 2:
         raise ValueError(f"{name}: expected [lowest, highest], not {value!r}")
 

@@ -63,7 +63,7 @@ async def play(
         recording = recording.reversed()
 
     check_recording(recording, arm)
-    report = progress or (lambda done, total: None)  # noqa: ARG005 - nobody wants to know
+    report: Progress = progress or (lambda done, total: None)  # noqa: ARG005 - nobody wants to know
     player = taught(arm)
     async with player.at_speed(None if recording.path else percent):
         state: dict[str, Any] = {}

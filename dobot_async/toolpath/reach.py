@@ -10,7 +10,8 @@ from dobot_async.arms.magician.kinematics import BEYOND_LIMIT, Kinematics, Unrea
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.mycobot.models import CobotModel
 from dobot_async.arms.ultraarm.arm import UltraArm
-from dobot_async.arms.ultraarm.params import CoordsMove, UltraArmLimits
+from dobot_async.arms.ultraarm.limits import UltraArmLimits
+from dobot_async.arms.ultraarm.params import CoordsMove
 from dobot_async.toolpath.moves import Reach, Tool, check_moves
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.schedule import TOLERANCE, planned, position_in, simplified

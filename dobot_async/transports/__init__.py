@@ -21,7 +21,7 @@ SCHEMES = {
         "dobot_async.transports.zenoh.transport",
         "zenoh://NAME (a served arm; ?connect=tcp/host:port&config=FILE)",
     ),
-    "ble": ("dobot_async.transports.ble.transport", "ble://NAME, ble://ADDRESS, ble: (the first arm in range)"),
+    "ble": ("dobot_async.transports.ble.opening", "ble://NAME, ble://ADDRESS, ble: (the first arm in range)"),
     "sim": ("dobot_async.simulator.url", "sim: (?speed=10&seed=1&loss=0.05&latency=0.01)"),
 }
 

@@ -55,7 +55,7 @@ def options(url: SplitResult, known: Mapping[str, Option | Callable[[str], Any]]
     if url.fragment:
         raise ValueError("what is behind a # would be left out; a # in a URL is written %23")
 
-    found = {}
+    found: dict[str, Any] = {}
     for name, text in parse_qsl(url.query, keep_blank_values=True, strict_parsing=bool(url.query)):
         if name not in known:
             raise ValueError(f"unknown option {name!r}; known: {', '.join(known) or 'none'}")

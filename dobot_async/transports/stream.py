@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 __all__ = ["StreamTransport"]
@@ -14,7 +14,12 @@ class StreamTransport:
     def __init__(self, stream: Any, *, in_flight: int, window: int, reorder_window: float = 0.0) -> None:
         self.in_flight = in_flight
         self.window = window
-        self.reorder_window = reorder_window
-        self.send: Callable[[bytes], Any] = stream.send
-        self.receive: Callable[[], Any] = stream.receive
-        self.aclose: Callable[[], Any] = stream.aclose
+        self._reorder_window = reorder_window
+        self.send: Callable[[bytes], Coroutine[Any, Any, None]] = stream.send
+        self.receive: Callable[[], Coroutine[Any, Any, bytes]] = stream.receive
+        self.aclose: Callable[[], Coroutine[Any, Any, None]] = stream.aclose
+
+    @property
+    def reorder_window(self) -> float:
+        """Seconds within which messages may overtake one another; 0 on a stream."""
+        return self._reorder_window

@@ -13,7 +13,7 @@ from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.frame import Parser, encode
 from dobot_async.simulator import DeviceOptions, SimulatedUltraArm, UltraArmQuirks, simulate
 from dobot_async.simulator.device.work import Fault
-from dobot_async.simulator.ultraarm.body import REACH, forward, inverse
+from dobot_async.simulator.ultraarm.kinematics import REACH, forward, inverse
 
 PLAIN = UltraArmQuirks(acknowledge="ok")
 

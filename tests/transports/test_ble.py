@@ -57,6 +57,7 @@ from dobot_async.simulator.ble.names import ADAPTER
 from dobot_async.simulator.ble.testbed import Rig, rig
 from dobot_async.transports.ble import diagnostics as ble_advice
 from dobot_async.transports.ble import lock as ble_claim
+from dobot_async.transports.ble import opening
 from dobot_async.transports.ble import scan as ble_scan
 from dobot_async.transports.ble import transport as ble
 
@@ -102,8 +103,8 @@ async def module(world: Rig, sim: Simulation) -> Module:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """What waits for an arm that is not there waits less."""
-    monkeypatch.setattr(ble, "SCAN", 0.3)
-    monkeypatch.setattr(ble, "PAUSES", (0.01, 0.01))
+    monkeypatch.setattr(opening, "SCAN", 0.3)
+    monkeypatch.setattr(opening, "PAUSES", (0.01, 0.01))
 
 
 def fast(**details: Any) -> Radio:
@@ -335,7 +336,7 @@ async def test_an_arm_that_another_program_uses_is_left_alone(
 ) -> None:
     async with opened(module.url) as transport:
         if not of_ours:
-            monkeypatch.setattr(ble, "claim", lambda _: ble_claim.Claim(None))
+            monkeypatch.setattr(opening, "claim", lambda _: ble_claim.Claim(None))
 
         with pytest.raises(ConnectFailed, match="else on this computer uses D8:B0:4C:B3:38:68; end it first"):
             await open_transport("ble:", arm="magician")

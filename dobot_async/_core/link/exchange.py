@@ -32,8 +32,7 @@ __all__ = ["Exchange"]
 F = TypeVar("F", bound=Frame)
 logger = logging.getLogger("dobot_async.link")
 TICK = 1e-6  # seconds that count as none
-MOST = 20_000
-"""Outstanding requests with which the link is given up: about an hour of an arm that answers nothing."""
+MOST = 20_000  # outstanding requests with which the link is given up: an hour of an arm that answers nothing
 
 
 class Exchange(Connection, Generic[F]):
@@ -129,8 +128,7 @@ class Exchange(Connection, Generic[F]):
         await self._settle(request, self._loop.time() + timeout)
         if request.outcome is Outcome.FAILED:
             self._check()
-
-        if request.outcome is None:
+        elif request.outcome is None:
             raise ReplyTimeout(f"{self.url} has not answered for {timeout:.3g} s")
 
         return request.outcome is Outcome.REPLY
@@ -288,7 +286,7 @@ class Exchange(Connection, Generic[F]):
         self._silence.heard()
 
     def _suspected(self, key: Hashable) -> bool:
-        """Return whether a reply of a key may come alone, long after its turn; of datagrams any may."""
+        """Whether a reply of a key may come alone, long after its turn; of datagrams any may."""
         return not self._correlator.reorder_window and self._stragglers.suspected(key, self._loop.time())
 
     def _sent(self, frame: F, accept: Callable[[F], Any], **flags: bool) -> Request[F]:

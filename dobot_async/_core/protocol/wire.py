@@ -21,9 +21,9 @@ import enum
 import math
 import operator
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Annotated, Any, Generic, Protocol, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Generic, Protocol, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from dobot_async.errors import ProtocolError
 
@@ -142,7 +142,7 @@ class Field:
 
         python_type, scalar, *_ = get_args(annotation)
         convert = isinstance(python_type, type) and issubclass(python_type, (bool, enum.IntEnum))
-        return cls(name, scalar, python_type if convert else None)
+        return cls(name, scalar, cast("type[bool | enum.IntEnum]", python_type) if convert else None)
 
     @property
     def codes(self) -> str:
@@ -293,6 +293,11 @@ class Command(Generic[Q, R]):
 
     def __repr__(self) -> str:
         return f"<{self.name} {self.id}>"
+
+
+def commands_in(names: Mapping[str, object]) -> tuple[Command[Any, Any], ...]:
+    """Returns the rows among the names of a module, in their order."""
+    return tuple(row for row in tuple(names.values()) if isinstance(row, Command))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
 
 
 def unpack(layout: struct.Struct, data: bytes, build: Callable[[tuple[Any, ...]], V]) -> V:

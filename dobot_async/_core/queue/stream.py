@@ -151,7 +151,9 @@ class Feeder:
                 is_verb = isinstance(step, Coroutine)
                 self._putting = (name_of(step, number), step)
                 await self._acquire(step)
-                motion = await (step if is_verb else self._queue.put(step.command, step.value, epoch=self._epoch))
+                motion: object = await (
+                    step if is_verb else self._queue.put(step.command, step.value, epoch=self._epoch)
+                )
                 if not isinstance(motion, Motion):
                     raise TypeError("a step is a verb of the queue, such as arm.queue.home(), or has command and value")
 

@@ -6,7 +6,7 @@ import math
 import operator
 from collections.abc import Sequence
 from enum import IntEnum
-from typing import Any, SupportsFloat, SupportsIndex, TypeVar
+from typing import Any, SupportsFloat, SupportsIndex, TypeVar, cast
 
 from dobot_async.arms.magician import commands as c
 
@@ -81,7 +81,7 @@ def to_flag(name: str, value: Any) -> bool:
         TypeError: It is none: a text, None, several.
     """
     wrong = TypeError(f"{name} must be True or False, not {value!r}")
-    if value is None or not hasattr(type(value), "__bool__"):
+    if value is None or not hasattr(cast("type[object]", type(value)), "__bool__"):
         raise wrong
 
     try:

@@ -16,13 +16,11 @@ from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.workspace import Workspace, workspace_of
-from dobot_async.arms.info import DeviceInfo
 from dobot_async.arms.keeping import kept_inside
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician import frame
 from dobot_async.arms.magician.alarms import Alarm, decode
 from dobot_async.arms.magician.arguments import to_choice, to_flag
-from dobot_async.arms.magician.declared import told_rail
 from dobot_async.arms.magician.executor import MagicianExecutor
 from dobot_async.arms.magician.following import MagicianFollowing
 from dobot_async.arms.magician.goals import Need, Plan
@@ -30,40 +28,24 @@ from dobot_async.arms.magician.hand import Led
 from dobot_async.arms.magician.jogs import Jog
 from dobot_async.arms.magician.keeping import MagicianKeeper, Stand, check_jog
 from dobot_async.arms.magician.kinematics import Joints, Kinematics
+from dobot_async.arms.magician.opening import BARRIERS, silent
 from dobot_async.arms.magician.queue import MagicianQueue
 from dobot_async.arms.magician.ranges import check_ranges
 from dobot_async.arms.magician.reach import check_reach as check_target
+from dobot_async.arms.magician.readings import Readings
 from dobot_async.arms.magician.sensors import Sensors
 from dobot_async.arms.magician.verbs import Verbs
 from dobot_async.arms.magician.wifi import WiFi
 from dobot_async.arms.session import arm_session, check_options, open_in_time, run_owned
-from dobot_async.errors import ConnectFailed, DobotError, MotionStopped
+from dobot_async.errors import DobotError, MotionStopped
 
 __all__ = ["Jog", "Magician"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-TEACH_INTERVAL = 0.05
 
 
-BARRIERS = (
-    c.GET_END_EFFECTOR_PARAMS,
-    c.GET_PTP_COMMON_PARAMS,
-    c.GET_JOG_COMMON_PARAMS,
-    c.GET_CP_PARAMS,
-    c.GET_PTP_JUMP_PARAMS,
-    c.GET_ARC_PARAMS,
-    c.GET_HHT_TRIG_MODE,
-    c.GET_END_EFFECTOR_LASER,
-    c.GET_END_EFFECTOR_SUCTION_CUP,
-    c.GET_END_EFFECTOR_GRIPPER,
-    c.GET_HOME_PARAMS,
-    c.GET_PTP_COORDINATE_PARAMS,
-)
-"""Cheap reads used as barriers: the answer to one proves that earlier requests will not be answered."""
-
-
-class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
+class Magician(Readings, Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
     """A Dobot Magician; made by `connect`. Each verb returns when the arm has done it.
 
     A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
@@ -199,31 +181,6 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
         request = self.link.request(command, value, timeout=timeout)
         return await (self.queue.beside(request) if command.moves else request)
 
-    async def get_pose(self, *, timeout: float | None = None) -> c.Pose:
-        """Returns where the tool is (mm, degrees) and the joints (degrees). Manual 2.4.1."""
-        return await self.link.request(c.GET_POSE, None, timeout=timeout)
-
-    async def get_joints(self, *, timeout: float | None = None) -> tuple[float, ...]:
-        """Returns the four joint angles, degrees. Manual 2.4.1."""
-        return (await self.get_pose(timeout=timeout)).joints
-
-    async def get_rail(self, *, timeout: float | None = None) -> float:
-        """Returns where the arm stands on its rail, in mm.
-
-        Raises:
-            UnsupportedError: It has none, or was not told that it has; see `set_rail`.
-        """
-        return told_rail(await self.link.request(c.GET_POSE_L, None, timeout=timeout))
-
-    async def get_info(self, *, timeout: float | None = None) -> DeviceInfo:
-        """Returns serial number, name and firmware version. Manual 2.3."""
-        version = await self.link.request(c.GET_DEVICE_VERSION, None, timeout=timeout)
-        return DeviceInfo(
-            serial_number=await self.link.request(c.GET_DEVICE_SN, None, timeout=timeout),
-            name=await self.link.request(c.GET_DEVICE_NAME, None, timeout=timeout),
-            version=f"{version.major_version}.{version.minor_version}.{version.revision}",
-        )
-
     async def get_alarms(self, *, timeout: float | None = None) -> tuple[Alarm, ...]:
         """Returns all alarms that are set, with cause and remedy. Manual 2.5.1."""
         return decode(await self.link.request(c.GET_ALARMS_STATE, None, timeout=timeout))
@@ -353,17 +310,3 @@ class Magician(Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
     async def _place(self) -> tuple[float, float, float]:
         pose = await self.get_pose()
         return pose.x, pose.y, pose.z
-
-
-def silent(link: Link[frame.Frame]) -> ConnectFailed:
-    """Why no arm answered, as far as what came instead tells."""
-    if link.stats.junk_bytes:
-        return ConnectFailed(
-            f"{link.url} sends {link.stats.junk_bytes} bytes that are no answer of a Magician; is the baud rate right, "
-            "is it a Magician, and does it run the Dobot firmware (in 3D-printing mode it speaks G-code)?"
-        )
-
-    return ConnectFailed(
-        f"no Magician answers at {link.url}; is the arm switched on (not only on USB power), is this its port or "
-        "address, and does it run the Dobot firmware (in 3D-printing mode it speaks G-code)?"
-    )

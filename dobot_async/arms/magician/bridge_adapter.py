@@ -17,8 +17,8 @@ from dobot_async.arms.bridge_adapter import ByKey, Kind, Reading, Switch
 from dobot_async.arms.magician import alarms
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician import frame as f
-from dobot_async.arms.magician.arm import BARRIERS
 from dobot_async.arms.magician.frame import Frame
+from dobot_async.arms.magician.opening import BARRIERS
 from dobot_async.arms.magician.stopping import LEAVING, TOOLS
 from dobot_async.arms.session import open_in_time
 from dobot_async.errors import ProtocolError

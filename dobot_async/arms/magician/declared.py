@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.magician import commands as c
@@ -145,7 +145,7 @@ def needs_rail(value: Any) -> bool:
 
 def pins(value: Any) -> list[tuple[int, PinUse]]:
     """The pins that a command uses."""
-    find = PINS.get(type(value))
+    find = PINS.get(cast("type[object]", type(value)))
     return find(value) if find else []
 
 

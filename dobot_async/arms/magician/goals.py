@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.magician import commands as c
@@ -70,7 +70,7 @@ def goal_of(kinematics: Kinematics, pose: c.Pose, rail: float | None) -> Goal:
 
 def follow(goal: Goal, value: Any) -> Goal:
     """Return the goal behind a command."""
-    step = STEPS.get(type(value))
+    step = STEPS.get(cast("type[object]", type(value)))
     return step(goal, value) if step else goal
 
 

@@ -5,8 +5,8 @@ They are no limits of the wire, so that the rows do not have them: an arm may te
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.arguments import above_zero, to_number
@@ -38,10 +38,14 @@ NOT_BELOW_ZERO: Mapping[type, tuple[str, ...]] = {
 
 def check_ranges(value: Any) -> None:
     """Raise ValueError for parameters with which a motion never ends, or ends with an alarm for certain."""
-    for name in ABOVE_ZERO.get(type(value), ()):
-        found = getattr(value, name)
-        for place, each in enumerate(found) if isinstance(found, (tuple, list)) else [(None, found)]:
-            above_zero(name if place is None else f"{name}[{place}]", each)
+    kind = cast("type[object]", type(value))
+    for name in ABOVE_ZERO.get(kind, ()):
+        found: Any = getattr(value, name)
+        if isinstance(found, (tuple, list)):
+            for place, each in enumerate(cast("Sequence[Any]", found)):
+                above_zero(f"{name}[{place}]", each)
+        else:
+            above_zero(name, found)
 
-    for name in NOT_BELOW_ZERO.get(type(value), ()):
+    for name in NOT_BELOW_ZERO.get(kind, ()):
         to_number(name, getattr(value, name), least=0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.kinematics import Kinematics
@@ -29,7 +29,7 @@ class Destination(NamedTuple):
 
 def destination(value: Any) -> Destination | None:
     """Returns where a command leads, None if that depends on where the arm will be, or if it leads nowhere."""
-    find = DESTINATIONS.get(type(value))
+    find = DESTINATIONS.get(cast("type[object]", type(value)))
     return find(value) if find else None
 
 

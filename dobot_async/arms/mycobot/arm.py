@@ -8,8 +8,6 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal, Self, TypeVar, cast
 
-import anyio
-
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.protocol.transport import Transport
@@ -18,20 +16,19 @@ from dobot_async._core.queue.host import HostExecutor
 from dobot_async._core.util.arguments import check_duration, check_timeout
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.workspace import Workspace, workspace_of
-from dobot_async.arms.keeping import kept_inside
 from dobot_async.arms.mycobot import commands as c
 from dobot_async.arms.mycobot import frame
 from dobot_async.arms.mycobot.channel import Channel
 from dobot_async.arms.mycobot.executor import CobotRunner, Tolerance
 from dobot_async.arms.mycobot.following import CobotFollowing
 from dobot_async.arms.mycobot.gripper import GRIPPER
-from dobot_async.arms.mycobot.jog import jog_command, jogging
+from dobot_async.arms.mycobot.jogging import Jogging
 from dobot_async.arms.mycobot.keeping import CobotKeeper
 from dobot_async.arms.mycobot.models import DEFAULT, CobotModel, Range, model_of
 from dobot_async.arms.mycobot.opening import BARRIERS, GAP, greet, opened, reply_times, with_baud
 from dobot_async.arms.mycobot.queue import CobotQueue
 from dobot_async.arms.mycobot.readings import Readings
-from dobot_async.arms.mycobot.verbs import SPEED, Verbs
+from dobot_async.arms.mycobot.verbs import Verbs
 from dobot_async.arms.session import arm_session, check_options, run_owned
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
 
@@ -44,7 +41,7 @@ TOLERANCE: Tolerance = (4.0, 8.0)
 """Half as much again as the worst that users report of a 280: 2.6 degrees, and 4.3 mm along an axis."""
 
 
-class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
+class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
     """An arm behind a link; made by `MyCobot.connect`. Each verb returns when the arm has done it.
 
     A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
@@ -257,48 +254,6 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
         """
         await self.queue.stop(timeout=timeout)
 
-    async def jog(self, direction: str, seconds: float, *, speed: int = SPEED) -> None:
-        """Jog for a time, then stop.
-
-        Args:
-            direction: j1+ j1- ... for a joint, x+ x- y+ y- z+ z- rx+ rx- ry+ ry- rz+ rz- for the tool, as far as the
-                model has them.
-            seconds: How long, finite and not negative.
-            speed: Percent.
-
-        Raises:
-            DobotError: As `jogging`.
-        """
-        seconds = check_duration(seconds)
-        async with self.jogging(direction, speed=speed):
-            await anyio.sleep(seconds)
-
-    @asynccontextmanager
-    async def jogging(self, direction: str, *, speed: int = SPEED) -> AsyncGenerator[None]:
-        """Jog until the block ends, however it ends; the stop is repeated until the arm says that it stands.
-
-        A block that ends well is followed by an error if the arm did not jog until its end.
-
-        Args:
-            direction: As for `jog`.
-            speed: Percent.
-
-        Raises:
-            ValueError: There is no such direction; the message lists those of this model.
-            CommandRejected: The arm did not move, or motions of the queue are under way.
-            MotionStopped: It came to rest before the end, at a limit or at the end of its reach; or it was stopped
-                before the tool left the workspace of `connect`.
-            ArmAlarm: A joint keeps it from moving.
-            ReplyTimeout: The arm does not answer when it is to begin, or when it is to stop.
-        """
-        jog = jog_command(self._model, direction, speed)
-        self.link.frame(self._model.row(jog[0]), jog[1])
-        async with (
-            jogging(self._channel, self._runner, direction, jog, self.queue),
-            kept_inside(self._workspace, self._place, self._runner.stop, direction),
-        ):
-            yield
-
     async def jog_stop(self) -> None:
         """Stop a jog; it stops any other motion as well."""
         await self.stop()
@@ -328,11 +283,6 @@ class MyCobot(Readings, Verbs[Coroutine[Any, Any, None]]):
                 raise
 
             raise ReplyTimeout(f"the gripper was not seen to be done within {timeout:.3g} s; it may go on") from None
-
-    async def _place(self) -> tuple[float, ...]:
-        """Where the tool is."""
-        coords = await self._channel.ask(c.GET_COORDS, None)
-        return tuple(coords)[:3]
 
     async def greet(self, timeout: float) -> None:
         """Prove that an arm answers, and as its model does, and stop it if that was asked for; for `connect`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.mycobot import commands as c
@@ -19,7 +19,7 @@ Check = Callable[["CobotModel", Any], None]
 
 def check(model: CobotModel, command: Command[Any, Any], value: Any) -> None:
     """Raise ValueError for parameters of a command that a model cannot do."""
-    found = OF_ROW.get(command) or OF_VALUE.get(type(value))
+    found = OF_ROW.get(command) or OF_VALUE.get(cast("type[object]", type(value)))
     if found:
         found(model, value)
 

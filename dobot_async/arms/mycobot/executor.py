@@ -15,7 +15,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.queue.executor import Entry
@@ -291,4 +291,4 @@ class CobotRunner:
 
 def numbers(reading: Any) -> Sequence[float]:
     """A reading as a row of numbers."""
-    return reading if isinstance(reading, tuple) else (reading,)
+    return cast("tuple[float, ...]", reading) if isinstance(reading, tuple) else (reading,)

@@ -64,7 +64,7 @@ class Grip:
         if before.moving is None and before.value is None:
             raise MotionUnknown("the arm's firmware tells nothing of its gripper, so what that does cannot be seen")
 
-        tell = partial(self._channel.tell, command, value, timeout=SILENCE)
+        tell, heard = partial(self._channel.tell, command, value, timeout=SILENCE), False
         for _ in range(2):
             heard = await self._channel.through_outages(tell)
             if await self._rests(before):

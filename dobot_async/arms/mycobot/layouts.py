@@ -65,7 +65,7 @@ class Fixed:
         if value is None and self.optional:
             return b""
 
-        values = [value] if self.count is None else list(value)
+        values: list[Any] = [value] if self.count is None else list(value)
         wanted = sizes.get(self.count) if self.count else 1
         if wanted is not None and len(values) != wanted:
             raise ValueError(f"{name} must have {wanted} values for this arm, not {len(values)}")

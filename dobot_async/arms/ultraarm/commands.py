@@ -12,15 +12,16 @@ disagree.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 from dobot_async._core.protocol.layouts import NOTHING
 from dobot_async._core.protocol.rows import Rows
-from dobot_async._core.protocol.wire import Command, Layout, Queueing
+from dobot_async._core.protocol.wire import Command, Layout, Queueing, commands_in
 from dobot_async.arms.ultraarm.answers import RECEIPT, STATUS, Bracket, Numbers, Receipt
 from dobot_async.arms.ultraarm.layouts import Relative, Whole, Words
+from dobot_async.arms.ultraarm.limits import *
 from dobot_async.arms.ultraarm.params import *
 
 Q = TypeVar("Q")
@@ -58,7 +59,11 @@ def motion(word: str, request: type[Q] | Layout[Q], section: str) -> Command[Q, 
 
 def plain(convert: type[R]) -> tuple[Any, Any]:
     """How one number in brackets is read and written."""
-    return (lambda texts: convert(*texts)), str
+
+    def read(texts: Sequence[str]) -> R:
+        return convert(*texts)
+
+    return read, str
 
 
 NEVER = Queueing.NEVER
@@ -67,8 +72,8 @@ COORDS_MOVE = Words(CoordsMove)
 MOVE_COORDS = motion("G0", COORDS_MOVE, "coordinate control")
 MOVE_LINE = motion("G1", COORDS_MOVE, "G-code programs")  # in no manual, and in every program that is published
 WAIT = write("G4", Whole(Dwell), "wait (seconds)", Queueing.ALWAYS)
-GET_SYSTEM_VERSION = read("G6", Bracket[float]("GetSystemVersion", *plain(float)), "pymycobot")
-GET_MODIFY_VERSION = read("G7", Bracket[int]("GetModifyVersion", *plain(int)), "pymycobot")
+GET_SYSTEM_VERSION = read("G6", Bracket[float]("GetSystemVersion", *plain(float)), "pymycobot")  # of the firmware
+GET_MODIFY_VERSION = read("G7", Bracket[int]("GetModifyVersion", *plain(int)), "pymycobot")  # of the firmware
 HOME = motion("G28", NOTHING, "back to zero point")
 ABSOLUTE = write("G90", NOTHING, "set absolute cartesian mode")
 RELATIVE = write("G91", NOTHING, "set relative cartesian mode")
@@ -98,7 +103,7 @@ FAN_OFF = write("M28", NOTHING, "set fan off")
 SET_GRIPPER_CLOSE_POSITION = write("M29", GripperClosePosition, "pymycobot")
 GET_GRIPPER_POSITION = ask("M30", ModeOfGripper, Numbers("GetGripperPosition", GripperPosition, int), "pymycobot")
 CALIBRATE_J1 = Command("M31", code("M31"), NOTHING, RECEIPT, "pymycobot", write=True, repeatable=False, timeout=SLOW)
-GET_CALIBRATION_STEP = read("M32", Bracket[int]("J1CAL", *plain(int)), "pymycobot")
+GET_CALIBRATION_STEP = read("M32", Bracket[int]("J1CAL", *plain(int)), "pymycobot")  # which of them
 GET_GRIPPER_ANGLE = ask("M50", ModeOfGripper, Bracket[int]("GRIPPERANGLE", *plain(int)), "pymycobot")
 SET_SERVO_REGISTER = write("M51", ServoValue, "pymycobot", NEVER)
 GET_SERVO_REGISTER = ask("M52", ServoRegister, Bracket[int]("ReadSYS", *plain(int)), "pymycobot")
@@ -107,5 +112,5 @@ GET_ENDSTOPS = read("M119", Numbers("ENDSTOP", Endstops, int), "get the status o
 GET_QUEUE_SIZE = read("M120", RECEIPT, "pymycobot")
 
 # The order of the module is the order of the table.
-ALL: tuple[Command[Any, Any], ...] = tuple(row for row in tuple(globals().values()) if isinstance(row, Command))
+ALL = commands_in(globals())
 BY_WORD: Mapping[str, Command[Any, Any]] = MappingProxyType({row.name: row for row in ALL if row is not MOVE_BY})

@@ -9,7 +9,8 @@ __all__ = ["FAMILY"]
 FAMILY = Family(
     public={
         "dobot_async.arms.ultraarm.arm": ("UltraArm", "UltraArmJog"),
-        "dobot_async.arms.ultraarm.params": ("UltraArmAngles", "UltraArmCoords", "UltraArmLimits", "UltraArmPose"),
+        "dobot_async.arms.ultraarm.limits": ("UltraArmLimits",),
+        "dobot_async.arms.ultraarm.params": ("UltraArmAngles", "UltraArmCoords", "UltraArmPose"),
     },
     simulator="dobot_async.simulator.ultraarm.arm:SimulatedUltraArm",
     scene="dobot_async.simulator.scene.arms.ultraarm:UltraArmInScene",

@@ -144,13 +144,13 @@ class Parser:
     def __init__(self) -> None:
         self.junk_bytes = 0
         self.bad_frames = 0
-        self._buffer = b""
+        self._buffer: bytes = b""
 
     def feed(self, data: bytes) -> list[Frame]:
         """Take the next bytes of the stream, return the answers that they close."""
         text = printable(data)
         self.junk_bytes += len(data) - len(text)
-        buffer = self._buffer + text
+        buffer: bytes = self._buffer + text
         frames: list[Frame] = []
         at = 0
         for found in CLOSING.finditer(buffer):

@@ -179,7 +179,7 @@ def goal_of(command: Command[Any, Any], value: Any, switches: tuple[int, ...] | 
 
 def summed(value: c.CoordsMove, status: Status) -> c.CoordsMove:
     """Return the target of increments from where the arm stands."""
-    here = dict(zip(AXES, status.coords, strict=False))
+    here: dict[str, float] = dict(zip(AXES, status.coords, strict=False))
     given = {name: getattr(value, name) for name in AXES}
     target = {name: round(here[name] + by, 2) for name, by in given.items() if by is not None}
     return c.CoordsMove(**target, f=value.f)

@@ -23,10 +23,10 @@ from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.executor import Entry, alarmed
 from dobot_async._core.util.workspace import OutsideWorkspace, Workspace
 from dobot_async.arms.ultraarm import commands as c
-from dobot_async.arms.ultraarm.answers import Receipt, Status
+from dobot_async.arms.ultraarm.acknowledged import TRIES, Acknowledged
 from dobot_async.arms.ultraarm.channel import Channel
 from dobot_async.arms.ultraarm.frame import Frame
-from dobot_async.arms.ultraarm.goals import INCREMENTS, Fault, Goal, goal_of, summed
+from dobot_async.arms.ultraarm.goals import INCREMENTS, goal_of, summed
 from dobot_async.arms.ultraarm.keeping import Stand, UltraArmKeeper
 from dobot_async.arms.ultraarm.state import ArmState
 from dobot_async.arms.ultraarm.status import RESTS, STATUS_AND_ANGLES, StatusPoller
@@ -38,8 +38,6 @@ __all__ = ["UltraArmRunner"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-SETTLED = 0.2  # seconds of rest elsewhere than it was told to, after which an arm has missed its goal
-TRIES = 5  # how often a command is sent that the arm does not acknowledge, and does not seem to do
 
 
 class UltraArmRunner:
@@ -80,6 +78,7 @@ class UltraArmRunner:
         self.status = StatusPoller(self.channel.read, lambda: link.stats)
         self.stopper = Stopper(self.status, self.state, on_stop)
         self.busy = self.jogging = False
+        self._commands = Acknowledged(self.channel, self.status)
         self._link = link
         self.limits = limits
         self._tolerance = tolerance
@@ -87,7 +86,6 @@ class UltraArmRunner:
         self._planned = replace(self.state)  # what it will be once all is done that was prepared
         self._idle = False  # whether it is known to rest with nothing in its queue
         self._absolute = False  # whether it is known to take coordinates for places
-        self._says_ok: bool | None = None
 
     async def ask(self, command: Command[Q, R], value: Q, *, timeout: float | None = None, urgent: bool = False) -> R:
         """Send one command at once, and return the arm's answer; see `Channel.ask`."""
@@ -227,8 +225,9 @@ class UltraArmRunner:
             self.status.begin(goal)
             before = self.status.last
             receipt = await self.channel.send(command, value)
-            if self._acknowledged(command, receipt) or await self._has_begun(goal, before):
-                fault = await self._arrive(goal)
+            acknowledged = self._commands.acknowledged(command, receipt)
+            if acknowledged or await self.status.has_begun(goal, before, self._tolerance):
+                fault = await self.status.arrive(goal, self._tolerance)
                 if fault is None:
                     break
 
@@ -283,35 +282,12 @@ class UltraArmRunner:
         coords = await self.channel.read(c.GET_COORDS)
         return Stand((coords.x, coords.y, coords.z), self.state.relative)
 
-    async def _arrive(self, goal: Goal) -> Fault | None:
-        """Return when the arm rests at a goal, or elsewhere: then what is wrong."""
-        while True:
-            status = await self.status.poll_paced()
-            if not self.status.is_at_rest:
-                continue
-
-            if goal.reached(status, self._tolerance, set_out=self.status.set_out):
-                return None
-
-            if self.status.now() >= self.status.rest_since + SETTLED and self.status.rests >= RESTS:
-                return goal.missed(status, set_out=self.status.set_out)
-
-    async def _has_begun(self, goal: Goal, before: Status | None) -> bool:
-        """Return whether an arm that has not acknowledged a motion does it, or has done it."""
-        while True:
-            status = await self.status.poll_paced()
-            if self.status.busy:
-                return True
-
-            if self.status.rests >= RESTS:
-                return goal.come_to(before, status, self._tolerance)
-
     async def _set(self, command: Command[Any, Any], value: Any) -> None:
         """Do what moves nothing, and return when it is done."""
         if command is not c.POWER_ON:  # what it takes away counts as gone, acknowledged or not
             self.state.note(command, value)
 
-        receipt = await self._taken(command, value)
+        receipt = await self._commands.taken(command, value)
         while receipt.queue_size and self.status.size:
             await self.status.poll_paced()
 
@@ -329,7 +305,7 @@ class UltraArmRunner:
             self.status.begin()
             outages = self._link.outages
             taken_at = self.status.now()
-            await self._taken(c.WAIT, c.Dwell(whole))
+            await self._commands.taken(c.WAIT, c.Dwell(whole))
             # Firmware may look idle while it waits: then the time has to pass here.
             while self.status.rests < RESTS or not (self.status.busy or self.status.now() >= taken_at + whole):
                 await self.status.poll_paced()
@@ -338,26 +314,3 @@ class UltraArmRunner:
                 raise MotionUnknown("the link was lost, and nothing tells whether the arm was switched off meanwhile")
 
         await asyncio.sleep(seconds - whole)
-
-    async def _taken(self, command: Command[Any, Any], value: Any) -> Receipt:
-        """Send what may be sent again until the arm acknowledges it."""
-        for _ in range(TRIES):
-            receipt = await self.channel.send(command, value)
-            if receipt and self._acknowledged(command, receipt):
-                self.status.size = receipt.queue_size
-                return receipt
-
-            await self.status.poll()  # raises if the arm is silent
-
-        raise MotionUnknown(f"the arm does not acknowledge {command.name}, sent {TRIES} times")
-
-    def _acknowledged(self, command: Command[Any, Any], receipt: Receipt | None) -> bool:
-        """Return whether an answer acknowledges a command: if the arm usually says something to one, it has to."""
-        if receipt is None or (not receipt.text and self._says_ok):
-            self._says_ok = None  # to be learnt again
-            return False
-
-        if command is not c.HOME:  # to which all firmware says something
-            self._says_ok = bool(receipt.text)
-
-        return True

@@ -29,6 +29,7 @@ SILENCE = 5.0  # seconds without an answer after which what the arm does cannot 
 PACE = 0.02  # seconds between two polls of an arm that moves
 DENSE = 0.003  # seconds between two polls at the least
 RESTS = 2  # polls in a row at which it rests; one is enough behind one at which it moved, on a line that lost nothing
+SETTLED = 0.2  # seconds of rest elsewhere than it was told to, after which an arm has missed its goal
 SOON = 0.15  # seconds before the end of a motion from when on it is polled without a pause
 STATUS_AND_ANGLES = replace(c.GET_STATUS, request=Also("M12"))
 
@@ -135,6 +136,29 @@ class StatusPoller:
 
         self.set_out = self.set_out or not status.at_rest or (self._before is not None and moved(self._before, status))
         return status
+
+    async def arrive(self, goal: Goal, tolerance: float) -> Fault | None:
+        """Return when the arm rests at a goal, or elsewhere: then what is wrong."""
+        while True:
+            status = await self.poll_paced()
+            if not self.is_at_rest:
+                continue
+
+            if goal.reached(status, tolerance, set_out=self.set_out):
+                return None
+
+            if self.now() >= self.rest_since + SETTLED and self.rests >= RESTS:
+                return goal.missed(status, set_out=self.set_out)
+
+    async def has_begun(self, goal: Goal, before: Status | None, tolerance: float) -> bool:
+        """Return whether an arm that has not acknowledged a motion does it, or has done it."""
+        while True:
+            status = await self.poll_paced()
+            if self.busy:
+                return True
+
+            if self.rests >= RESTS:
+                return goal.come_to(before, status, tolerance)
 
     def now(self) -> float:
         """Return the loop's time, seconds."""

@@ -100,7 +100,9 @@ def read_password(ssid: str) -> str:
     try:
         line = sys.stdin.readline() if sys.stdin is not None else ""
     except UnicodeDecodeError:
-        raise click.UsageError(f"the password on standard input is no {sys.stdin.encoding} text") from None
+        raise click.UsageError(
+            f"the password on standard input is no {sys.stdin and sys.stdin.encoding} text"
+        ) from None
 
     if not line.strip("\r\n"):
         raise click.UsageError("standard input has no password on its first line; --open is for networks without one")

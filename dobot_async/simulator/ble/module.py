@@ -33,11 +33,8 @@ from dobot_async.simulator.simulation import Simulation
 
 __all__ = ["Module"]
 
-CONNECTING, RESOLVING, SUBSCRIBING = 2, 4, 2
-"""Connection events that these take."""
-
-NOBODY = 2.0
-"""Seconds after which BlueZ gives up to connect to somebody who is not there."""
+CONNECTING, RESOLVING, SUBSCRIBING = 2, 4, 2  # connection events that these take
+NOBODY = 2.0  # seconds after which BlueZ gives up to connect to somebody who is not there
 
 
 class Module:

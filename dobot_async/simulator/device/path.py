@@ -248,7 +248,11 @@ def jump(
             return joint_leg(joints, joints, across, fault=Fault(fault.code + underway))
 
     legs = [line(origin, above_origin, start, vertical)]
-    for following in (sideways, lambda joints: line(above_target, target, joints, vertical)):
+
+    def down(joints: Vector) -> Leg:
+        return line(above_target, target, joints, vertical)
+
+    for following in (sideways, down):
         if legs[-1].fault:
             break
 

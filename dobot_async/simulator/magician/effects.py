@@ -61,7 +61,8 @@ class Works:
         if executed.command is c.SET_JOG_CMD and executed.index is None:
             self._jogging = None
         elif executed.command is c.SET_E_MOTOR_S:
-            self._state.motors[executed.value.index].run(0)
+            motor: int = executed.value.index
+            self._state.motors[motor].run(0)
 
         if executed.command and executed.command.moves and executed.outcome != "alarm":
             self._leave_limits(device)

@@ -15,7 +15,8 @@ from dobot_async.simulator.device.curve import Line
 from dobot_async.simulator.device.device import Activity, Fault, Vector
 from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg
 from dobot_async.simulator.device.profile import Pace, trapezoid
-from dobot_async.simulator.magician.motion import RAIL, Reach, along, clipped, standing
+from dobot_async.simulator.magician.motion import RAIL, along, clipped, standing
+from dobot_async.simulator.magician.reach import Reach
 from dobot_async.simulator.magician.state import State
 
 __all__ = ["jog", "margins"]

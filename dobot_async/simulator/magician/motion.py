@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 from dobot_async.arms.magician import commands as c
-from dobot_async.arms.magician.kinematics import Kinematics, Unreachable
 from dobot_async.simulator.device.curve import Line, arc, between, circle
 from dobot_async.simulator.device.device import Activity, Device, Fault, Vector
 from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg, jump, travel
 from dobot_async.simulator.device.profile import Pace, trapezoid
+from dobot_async.simulator.magician.reach import Reach
 from dobot_async.simulator.magician.state import HOME_JOINTS, HOME_POINT, State
 
-__all__ = ["RAIL", "AnyPTP", "Motions", "Reach", "along", "clipped", "standing"]
+__all__ = ["RAIL", "AnyPTP", "Motions", "along", "clipped", "standing"]
 
 AnyPTP = c.PTPCmd | c.PTPWithLCmd | c.PTPPOCmd | c.PTPPOWithLCmd
 
@@ -31,40 +30,6 @@ LOSE_STEP = range(0x50, 0x54)
 HOMING = trapezoid(1.0, 0.25, 0.25)  # five seconds
 NO_LIMIT = 1e6  # degrees/s and degrees/s² of a turn that the path's own speed decides about
 STANDSTILL = trapezoid(0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Reach:
-    """The kinematics as paths want them: points and joints of four numbers, and faults."""
-
-    kinematics: Kinematics
-
-    def forward(self, joints: Vector) -> Vector:
-        """Returns the point of four joints."""
-        return self.kinematics.forward(*joints)
-
-    def inverse(self, point: Vector) -> Vector:
-        """Returns the joints of a point, within their limits; raises Fault."""
-        try:
-            return self.kinematics.check(*point)
-        except Unreachable as error:
-            raise Fault(error.alarm) from None
-
-    def base_angle(self, x: float, y: float, z: float) -> float:
-        """Returns joint 1 of a place, whatever the limits; raises Fault."""
-        try:
-            return self.kinematics.inverse(x, y, z, 0.0).j1
-        except Unreachable as error:
-            raise Fault(error.alarm) from None
-
-    def check(self, joints: Vector) -> Vector:
-        """Returns these joints; raises Fault if they are beyond the limits."""
-        try:
-            self.kinematics.check_joints(*joints)
-        except Unreachable as error:
-            raise Fault(error.alarm) from None
-
-        return joints
 
 
 class Motions:

@@ -18,7 +18,8 @@ from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.frame import split_words
 from dobot_async.errors import ProtocolError
 from dobot_async.simulator.device.device import Device, DeviceOptions, Executed
-from dobot_async.simulator.ultraarm.body import Registers, Works, forward, plus, pose
+from dobot_async.simulator.ultraarm.body import Registers, Works, plus, pose
+from dobot_async.simulator.ultraarm.kinematics import forward
 
 __all__ = ["ULTRAARM", "SimulatedUltraArm", "UltraArmCounters", "UltraArmQuirks", "UltraArmSession"]
 

@@ -12,7 +12,7 @@ import sys
 from collections.abc import AsyncGenerator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 from weakref import WeakKeyDictionary
 
 import bleak
@@ -156,7 +156,7 @@ def seen_as(device: BLEDevice, advertisement: AdvertisementData) -> Seen:
 def is_connected(advertisement: AdvertisementData) -> bool:
     """Whether BlueZ says of a device that it is connected; a `BLEDevice` keeps what was said when it was new."""
     said = advertisement.platform_data[-1] if advertisement.platform_data else None
-    return isinstance(said, dict) and bool(said.get("Connected"))
+    return isinstance(said, dict) and bool(cast("dict[str, Any]", said).get("Connected"))
 
 
 async def connected(adapter: str | None = None) -> tuple[list[Seen], list[Seen]]:
@@ -216,7 +216,9 @@ async def listened_to() -> set[str]:
                 member="GetManagedObjects",
             )
         )
-        objects = unpack_variants(reply.body[0]) if reply and reply.signature == "a{oa{sa{sv}}}" else {}
+        objects: dict[str, dict[str, dict[str, Any]]] = (
+            unpack_variants(reply.body[0]) if reply and reply.signature == "a{oa{sa{sv}}}" else {}
+        )
     finally:
         bus.disconnect()
         with suppress(Exception):

@@ -85,8 +85,8 @@ class Session:
         config = self._place.configuration(serving=self._serving)
 
         def start() -> None:
-            self._zenoh = zenoh.open(config)
-            begin(self._zenoh)
+            self._zenoh = session = zenoh.open(config)
+            begin(session)
 
         try:
             await run_shielded(asyncio.to_thread(start))
@@ -109,7 +109,7 @@ class Session:
         last = self.crossing.to(told.put_nowait, lambda _: None)
         handler = library().handlers.Callback(each.callback, lambda: last.callback(None), indirect=False)
         self.raw.liveliness().get(key, handler, timeout=ALL_ANSWER)
-        found = []
+        found: list[str] = []
         while (token := await told.get()) is not None:
             found.append(token)
 

@@ -99,9 +99,9 @@ class ZenohTransport:
         if model != arm:
             raise ConnectFailed(f"{where} is a {model}, and not a {arm}")
 
+        refusal = "it does not answer; does Zenoh's access control allow this program to move it?"
         try:
             async with asyncio.timeout(LET_IN):
-                refusal = "it does not answer; does Zenoh's access control allow this program to move it?"
                 while (answer := await self._ask()) != "":
                     refusal = answer or refusal
                     await asyncio.sleep(ASK_AGAIN)

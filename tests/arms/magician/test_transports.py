@@ -33,7 +33,7 @@ from dobot_async import (
 from dobot_async._core.link.link import Link
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician import frame
-from dobot_async.arms.magician.arm import BARRIERS
+from dobot_async.arms.magician.opening import BARRIERS
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.transports import open_transport
 

@@ -6,7 +6,7 @@ from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.scene.geometry import Placement
 from dobot_async.simulator.scene.things import ColorSpot, LightBeam, Tool
 from dobot_async.simulator.ultraarm.arm import SimulatedUltraArm
-from dobot_async.simulator.ultraarm.body import forward
+from dobot_async.simulator.ultraarm.kinematics import forward
 
 __all__ = ["UltraArmInScene"]
 
