@@ -6,6 +6,7 @@ from typing import Any, Generic, TypeVar
 
 from dobot_async import ConnectionLost, LinkState, LinkStats
 from dobot_async import Link as AsyncLink
+from dobot_async._core.protocol.contract import LineLimits
 from dobot_async._core.util.events import Events as AsyncEvents
 from dobot_async._core.util.events import Watched as AsyncWatched
 from dobot_async._core.util.hooks import Hooks
@@ -58,6 +59,11 @@ class Link(Twin[AsyncLink[Any]]):
     def outages(self) -> int:
         """How often it was lost and reopened."""
         return self.asynchronous.outages
+
+    @property
+    def limits(self) -> LineLimits:
+        """What the transport can carry at a time; it may change when the link is reopened."""
+        return self.asynchronous.limits
 
     @property
     def stats(self) -> LinkStats:

@@ -57,7 +57,7 @@ print(sorted(name for name in sys.modules if name.partition(".")[0] in GONE))
 """
 REFUSED = {
     "pty": ("simulate(listen='pty')", "ValueError", "this system has no pseudo-terminals, which need POSIX"),
-    "ble": ("simulate(listen='ble')", "ValueError", "dbus-fast"),
+    "ble": ("simulate(listen='ble')", "ImportError", "dobot-async[ble-sim]"),
     "serial": ("Magician.connect('serial:///dev/ttyUSB0')", "ConnectFailed", "pyserial cannot be used here"),
 }
 
@@ -92,7 +92,7 @@ async def main():
     try:
         async with {call}:
             pass
-    except (ValueError, dobot_async.ConnectFailed) as error:
+    except (ImportError, ValueError, dobot_async.ConnectFailed) as error:
         print(type(error).__name__, error)
 
 asyncio.run(main())
