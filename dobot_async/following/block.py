@@ -56,6 +56,9 @@ class Unwatched:
         """Do nothing."""
         yield
 
+    def count(self, error: DobotError | None) -> None:
+        """Do nothing: it is no motion of the queue."""
+
 
 @asynccontextmanager
 async def follow_target(

@@ -24,6 +24,9 @@ class Watcher(Protocol):
     def watching(self) -> AbstractContextManager[None]:
         """While this is entered, the arm is asked how far it is."""
 
+    def count(self, error: DobotError | None) -> None:
+        """Take note of how something ended that moves the arm."""
+
 
 class Motion:
     """One queued command; awaitable any number of times, by any number of tasks.
@@ -119,6 +122,8 @@ class Motion:
             self._error = error
             self._ended.set()
             self.accepted_or_ended.set()
+            if self.moves:
+                self._queue.count(error)
 
 
 LOOKED_AT = 1.0
