@@ -1,7 +1,7 @@
 """The way of the imports, read from the source: layers know nothing of higher ones, and families not of each other.
 
 errors <- wire, util <- transports <- link <- queue <- following <- arms <- families <- discovery <- simulator
-<- toolpath, handling <- teaching <- cli <- __main__
+<- toolpath, handling <- teaching, metrics <- remote <- mcp_server, mqtt <- cli <- __main__
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ LAYERS = (
     ("discovery", "fleet", "hands"),
     ("simulator", "bridge"),
     ("toolpath", "handling"),
-    ("teaching",),
+    ("teaching", "metrics"),
+    ("remote",),
+    ("mcp_server", "mqtt"),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )
@@ -117,6 +119,7 @@ def test_modules_are_named_as_strings_in_the_places_alone_that_import_late() -> 
 def test_importing_the_package_brings_in_nothing_that_is_not_used_yet(statement: str) -> None:
     late = ["serial", "serial_asyncio", "bleak", "zenoh", "click", "rich", "dobot_async.simulator", "dobot_async.cli"]
     late += ["dobot_async.toolpath", "svgelements", "ezdxf", "PIL", "numpy", "potrace", "HersheyFonts"]
+    late += ["mcp", "aiomqtt", "prometheus_client", "pydantic", "dobot_async.mcp_server", "dobot_async.mqtt"]
     late += [f"dobot_async.{family}.commands" for family in FAMILIES] if statement == "import dobot_async" else []
     program = f"{statement}\nimport sys\nprint([name for name in {late!r} if name in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)

@@ -1,4 +1,4 @@
-"""The end of a client that may move the arm: if the arm is in the middle of a motion, it is stopped, until it stands."""
+"""The end of a client that may move the arm: an arm in the middle of a motion is stopped, until it is seen to stand."""
 
 from __future__ import annotations
 

@@ -1,0 +1,108 @@
+"""The figures of arms as Prometheus reads them: a row for each metric, with its name, its kind and what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+from dobot_async.contract import LinkState
+from dobot_async.metrics.figures import ArmFigures
+
+if TYPE_CHECKING:
+    from prometheus_client.core import Metric
+
+__all__ = ["CONTENT_TYPE", "metrics_text"]
+
+CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+MISSING = "prometheus-client is not installed, and metrics need it: pip install 'dobot-async[metrics]'"
+GAUGE, COUNTER = "gauge", "counter"
+
+
+class Row(NamedTuple):
+    """One metric.
+
+    Attributes:
+        name: Without the `_total` of counters.
+        kind: "gauge" or "counter".
+        text: What it says.
+        value: Its value; None leaves it out.
+    """
+
+    name: str
+    kind: str
+    text: str
+    value: Callable[[ArmFigures], float | None]
+
+
+ROWS = (
+    Row("dobot_link_up", GAUGE, "Whether the link to the arm is open.", lambda f: f.state is LinkState.OPEN),
+    Row("dobot_link_outages", COUNTER, "How often the link was lost and reopened.", lambda f: f.outages),
+    Row("dobot_link_requests", COUNTER, "Requests sent, repeated ones included.", lambda f: f.stats.sent),
+    Row("dobot_link_replies", COUNTER, "Whole frames received.", lambda f: f.stats.received),
+    Row("dobot_link_repeats", COUNTER, "Requests sent again.", lambda f: f.stats.repeated),
+    Row("dobot_link_losses", COUNTER, "Requests that were not answered in their turn.", lambda f: f.stats.lost),
+    Row("dobot_link_timeouts", COUNTER, "Calls that failed without an answer.", lambda f: f.stats.timeouts),
+    Row("dobot_link_unexpected", COUNTER, "Frames that answered nothing.", lambda f: f.stats.unexpected),
+    Row("dobot_link_bad_frames", COUNTER, "Frames with a wrong checksum.", lambda f: f.stats.bad_frames),
+    Row("dobot_link_junk_bytes", COUNTER, "Bytes that belong to no frame.", lambda f: f.stats.junk_bytes),
+    Row("dobot_link_round_trip_seconds", GAUGE, "What an answer takes on the average.", lambda f: f.round_trip),
+    Row("dobot_queue_pending", GAUGE, "Accepted commands that have not ended.", lambda f: f.pending),
+    Row("dobot_alarms", GAUGE, "Alarms that are set.", lambda f: f.alarms),
+    Row("dobot_moving", GAUGE, "Whether the arm is in the middle of something.", lambda f: f.moving),
+    Row("dobot_lease_held", GAUGE, "Whether somebody has the lease.", lambda f: f.held),
+    Row("dobot_bridge_clients", GAUGE, "Clients of the bridge.", lambda f: f.clients),
+    Row("dobot_bridge_stops", COUNTER, "How often something stopped the arm.", lambda f: f.stops),
+)
+
+
+class Figures:
+    """What a registry collects, once."""
+
+    def __init__(self, arms: Mapping[str, ArmFigures]) -> None:
+        self._arms = arms
+
+    def collect(self) -> Iterator[Metric]:
+        """Yield the metrics of all arms."""
+        from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily  # noqa: PLC0415 - it needs an extra
+
+        kinds = {GAUGE: GaugeMetricFamily, COUNTER: CounterMetricFamily}
+        for row in ROWS:
+            family = kinds[row.kind](row.name, row.text, labels=["arm"])
+            for name, figures in self._arms.items():
+                value = row.value(figures)
+                if value is not None:
+                    family.add_metric([name], float(value))
+
+            if family.samples:
+                yield family
+
+        motions = CounterMetricFamily("dobot_motions", "Motions that ended, by how.", labels=["arm", "outcome"])
+        for name, outcome, count in self._ended():
+            motions.add_metric([name, outcome], count)
+
+        yield motions
+
+    def _ended(self) -> Iterable[tuple[str, str, int]]:
+        for name, figures in self._arms.items():
+            if figures.pending is not None:
+                for outcome, count in sorted({"done": 0, **figures.motions}.items()):
+                    yield name, outcome, count
+
+
+def metrics_text(arms: Mapping[str, ArmFigures]) -> bytes:
+    """Return the figures of arms in Prometheus' text format, to be served as `CONTENT_TYPE`.
+
+    Args:
+        arms: The figures, by the names of the arms.
+
+    Raises:
+        ImportError: The extra `metrics` is not installed.
+    """
+    try:
+        from prometheus_client import CollectorRegistry, generate_latest  # noqa: PLC0415 - it needs an extra
+    except ImportError as error:
+        raise ImportError(MISSING, name=error.name) from error
+
+    registry = CollectorRegistry(auto_describe=False)
+    registry.register(Figures(arms))
+    return generate_latest(registry)
