@@ -17,4 +17,6 @@ def needing(extra: str) -> Iterator[None]:
         yield
     except ImportError as error:
         name = error.name or str(error)
-        raise click.UsageError(f"{name} is not installed, and this needs it: pip install 'dobot-async[{extra}]'") from None
+        raise click.UsageError(
+            f"{name} is not installed, and this needs it: pip install 'dobot-async[{extra}]'"
+        ) from None
