@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, Union, cast,
 if TYPE_CHECKING:
     from dobot_async.remote.site import RemoteArm
 
-__all__ = ["ACTIONS", "Action", "Note", "Way", "action", "parse_action"]
+__all__ = ["ACTIONS", "Action", "Note", "Strict", "Way", "action", "parse_action"]
 
 Note = Callable[[str], None]
 """Called with what is being done at the moment."""
@@ -47,6 +47,12 @@ class Action(Protocol):
 
     async def run(self, on: RemoteArm, note: Note) -> dict[str, Any]:
         """Do it, and return what is to be said of it when the arm has done it."""
+
+
+class Strict:
+    """For those who read actions with pydantic: there are no other fields."""
+
+    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
 
 
 ACTIONS: dict[str, type[Action]] = {}

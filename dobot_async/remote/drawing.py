@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from dobot_async.remote.actions import Note, Way, action
+from dobot_async.remote.actions import Note, Strict, Way, action
 from dobot_async.remote.moves import reached
 from dobot_async.remote.site import RemoteArm
 from dobot_async.toolpath import Drawing, Progress, Toolpath, WorkPlane, estimate, read_svg, write_text
@@ -22,7 +22,7 @@ Spot = tuple[float, float, float]
 
 @action
 @dataclass(frozen=True, kw_only=True)
-class Draw:
+class Draw(Strict):
     """Draw a text, or an SVG picture, with a pen."""
 
     x: float

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from dobot_async.handling import pick, place
-from dobot_async.hands import move_straight
-from dobot_async.remote.actions import Note, Way, action
+from dobot_async.hands import move_straight, settle_time
+from dobot_async.remote.actions import Note, Strict, Way, action
 from dobot_async.remote.site import RemoteArm
 from dobot_async.remote.told import pose_told
 
@@ -19,7 +19,7 @@ HIGHEST = 300.0
 """mm above a place where the way down to it may begin."""
 
 
-class Unseen:
+class Unseen(Strict):
     """An action of which a picture shows nothing: nobody knows the way, or there is none."""
 
     def ways(self, on: RemoteArm, start: Spot) -> list[Way]:
@@ -47,7 +47,7 @@ class Home(Unseen):
 
 @action
 @dataclass(frozen=True, kw_only=True)
-class Move:
+class Move(Strict):
     """Move the tool to a point; what is not given stays."""
 
     x: float | None = None
@@ -113,7 +113,7 @@ class Move:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Handling:
+class Handling(Strict):
     """What picking and placing have in common."""
 
     x: float
@@ -202,6 +202,9 @@ class Grip(Unseen):
         """Do it."""
         note("gripping" if self.hold else "letting go")
         await (on.arm.suction(self.hold) if self.tool == "suction" else on.arm.gripper(self.hold))
+        if seconds := settle_time(on.arm, self.tool):
+            await on.arm.wait(seconds)
+
         return {"done": self.do, "tool": self.tool, "hold": self.hold}
 
 
