@@ -176,7 +176,7 @@ async def serve_http(
 
     guard = Guard(app_of(server), Authenticator(token, frozenset(origins), lambda _: None, lambda *_: None), names)
     listening = listen(host, port)
-    running = Server(config_of(guard, certificate, key))
+    running, before = Server(config_of(guard, certificate, key)), watchers()
     serving = asyncio.create_task(running.serve([listening]), name="dobot_async mcp http")
     try:
         await started(running, serving)
@@ -184,7 +184,7 @@ async def serve_http(
         yield f"{'https' if certificate else 'http'}://{named}:{listening.getsockname()[1]}{PATH}"
     finally:
         server.works.close()
-        await run_shielded(ended(running, serving, listening))
+        await run_shielded(ended(running, serving, listening, before))
 
 
 def app_of(server: ArmServer) -> ASGIApp:
@@ -241,7 +241,15 @@ async def started(running: Server, serving: asyncio.Task[None]) -> None:
             raise ConnectFailed("the HTTP server has not started")
 
 
-async def ended(running: Server, serving: asyncio.Task[None], listening: socket.socket) -> None:
+def watchers() -> set[asyncio.Task[Any]]:
+    """The tasks of sse_starlette that wait for the end of a server, one a loop; nothing else ends them."""
+    name = "_shutdown_watcher"
+    return {task for task in asyncio.all_tasks() if getattr(task.get_coro(), "__qualname__", "") == name}
+
+
+async def ended(
+    running: Server, serving: asyncio.Task[None], listening: socket.socket, before: set[asyncio.Task[Any]]
+) -> None:
     """End it: open connections have a second."""
     running.should_exit = True
     left = set(running.server_state.tasks)
@@ -249,5 +257,5 @@ async def ended(running: Server, serving: asyncio.Task[None], listening: socket.
         await serving
 
     listening.close()
-    for task in left:
+    for task in left | (watchers() - before):
         await cancel_and_join(task)

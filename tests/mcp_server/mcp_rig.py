@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from bridge_rig import until
 from mcp import Client
 from mcp_types import CallToolResult, TextContent, TextResourceContents
 
@@ -19,7 +20,7 @@ from dobot_async.mcp_server import ArmServer, make_server
 from dobot_async.remote import Site, Works, open_site
 from dobot_async.simulator import Simulation, simulate
 
-__all__ = ["FAR", "IN_TIME", "Rig", "called", "moves", "rig", "stands", "started", "text_of"]
+__all__ = ["FAR", "IN_TIME", "Rig", "called", "moves", "rig", "stands", "started", "text_of", "until"]
 
 IN_TIME = 30.0
 FAR = {"x": 0.0, "y": -250.0, "z": 60.0}
@@ -59,17 +60,12 @@ def moves(sim: Simulation[Any], outcome: str | None = None) -> list[tuple[float,
 async def started(sim: Simulation[Any]) -> None:
     """Return when the arm moves."""
     before = sim.arm.pose
-    async with asyncio.timeout(IN_TIME):
-        while sim.arm.pose == before:
-            await asyncio.sleep(0.01)
+    await until(lambda: sim.arm.pose != before)
 
 
 async def stands(sim: Simulation[Any]) -> None:
-    """Return when the arm has been told to stop, and has nothing to do any more; fail if it has come to where it was to go."""
-    async with asyncio.timeout(IN_TIME):
-        while not sim.arm.device.idle:
-            await asyncio.sleep(0.01)
-
+    """Return when the arm has nothing to do any more, and stays; fail if it has come to where it was to go."""
+    await until(lambda: sim.arm.device.idle)
     pose = sim.arm.pose
     await asyncio.sleep(0.2)
     assert sim.arm.pose == pose

@@ -20,8 +20,10 @@ from dobot_async.fleet import Member
 from dobot_async.fleet.cell import parse_cell
 from dobot_async.magician import commands as c
 from dobot_async.mcp_server import make_server
+from dobot_async.mycobot import commands as cobot
 from dobot_async.remote import Works, open_site
 from dobot_async.simulator import simulate
+from dobot_async.ultraarm import commands as ultra
 
 MODES = pytest.mark.parametrize("mode", ["legacy", "auto"])
 MOVING = {"home", "move", "pick", "place", "grip", "draw", "recover", "stop"}
@@ -217,29 +219,32 @@ async def test_no_motion_is_faster_than_allowed(given: float | None, told: float
         assert ratios[-2:] == [told, told]
 
 
-async def test_other_families_go_no_faster_either() -> None:
-    async with simulate("mycobot280", speed=20) as cobot, simulate("ultraarm", speed=20) as ultra:
-        from dobot_async.mycobot import commands as m
-        from dobot_async.ultraarm import commands as u
+async def test_a_mycobot_goes_no_faster_either() -> None:
+    async with simulate("mycobot280", speed=20) as sim:
+        member = Member(sim.url, MyCobot, options={"model": "mycobot280"})
+        async with open_site(member, allow_motion=True, speed=20) as site, Client(make_server(Works(site))) as client:
+            arm: Any = site.named(None).arm
+            await arm.power_on()
+            await called(client, "home")
+            await called(client, "move", x=150, y=-60, z=220)
+            await client.call_tool("pick", {"x": 150, "y": -60, "z": 220, "tool": "gripper", "approach": 10})
+            assert (await client.call_tool("grip", {"hold": True, "tool": "suction"})).is_error
 
-        async with open_site(Member(cobot.url, MyCobot, options={"model": "mycobot280"}), allow_motion=True, speed=20) as site:
-            await site.named(None).arm.power_on()  # type: ignore[attr-defined]
-            async with Client(make_server(Works(site))) as client:
-                await called(client, "home")
-                await called(client, "move", x=150, y=-60, z=220)
-                await client.call_tool("pick", {"x": 150, "y": -60, "z": 220, "tool": "gripper", "approach": 10})
-                assert (await client.call_tool("grip", {"hold": True, "tool": "suction"})).is_error
-
-        speeds = [each.value.speed for each in cobot.arm.executed if each.command.name in {m.SEND_ANGLES.name, m.SEND_COORDS.name}]
-        assert len(speeds) > 1
+        names = {cobot.SEND_ANGLES.name, cobot.SEND_COORDS.name}
+        speeds = [each.value.speed for each in sim.arm.executed if each.command.name in names]
+        assert len(speeds) > 2
         assert max(speeds) <= 20
-        async with open_site(Member(ultra.url, UltraArm), allow_motion=True, speed=20) as site:
-            async with Client(make_server(Works(site))) as client:
-                await called(client, "home")
-                await called(client, "move", x=200, y=30, z=60)
-                await called(client, "pick", x=200, y=0, z=60)
 
-        speeds = [each.value.f for each in ultra.arm.executed if each.command in {u.MOVE_COORDS, u.MOVE_LINE}]
+
+async def test_an_ultraarm_goes_no_faster_either() -> None:
+    async with simulate("ultraarm", speed=20) as sim:
+        member = Member(sim.url, UltraArm)
+        async with open_site(member, allow_motion=True, speed=20) as site, Client(make_server(Works(site))) as client:
+            await called(client, "home")
+            await called(client, "move", x=200, y=30, z=60)
+            await called(client, "pick", x=200, y=0, z=60)
+
+        speeds = [each.value.f for each in sim.arm.executed if each.command in {ultra.MOVE_COORDS, ultra.MOVE_LINE}]
         assert len(speeds) == 4
         assert max(speeds) <= 40
 
@@ -289,7 +294,7 @@ async def test_a_plan_of_garbage_is_refused(steps: Any) -> None:
 async def test_progress_is_told_while_the_arm_moves(mode: str) -> None:
     told: list[tuple[float, str | None]] = []
 
-    async def tell(progress: float, _total: float | None, message: str | None) -> None:
+    async def tell(progress: float, total: float | None, message: str | None) -> None:
         told.append((progress, message))
 
     async with rig(speed=1.0) as r, Client(r.server, mode=mode) as client:
@@ -323,8 +328,8 @@ async def test_a_motion_does_not_outlive_its_client() -> None:
             task = asyncio.create_task(client.call_tool("move", FAR))
             await started(r.sim)
 
-        with pytest.raises(BaseException):  # noqa: B017 - however the client calls its end
-            await task
+        (ended,) = await asyncio.gather(task, return_exceptions=True)
+        assert isinstance(ended, BaseException)
 
         await stands(r.sim)
 
