@@ -63,7 +63,11 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
     if session.trace:
         raise click.UsageError("a bridge writes no trace: passwords go through it; trace the program that connects")
 
-    run(serve(session, token=own_token(token, token_file), **details))
+    token, metrics = own_token(token, token_file), details["metrics"]
+    if metrics and not is_loopback(metrics[0]) and token is None:
+        raise click.UsageError(f"--metrics at {metrics[0]} needs a token, as it does on every address of others")
+
+    run(serve(session, token=token, **details))
 
 
 async def serve(

@@ -12,14 +12,15 @@ import click
 
 from dobot_async.cli.credentials import token_in_file
 from dobot_async.cli.failures import WrongFile
-from dobot_async.cli.params import FINITE, PERCENT, PROGRAM
+from dobot_async.cli.params import FINITE, PERCENT, PROGRAM, Text
 from dobot_async.cli.session import Session
 
 if TYPE_CHECKING:
+    from dobot_async.fleet.cell import Cell
     from dobot_async.fleet.member import Member
     from dobot_async.remote import Site
 
-__all__ = ["of_a_site", "site_of", "token_of"]
+__all__ = ["names_of", "of_a_site", "site_of", "token_of"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 OPTIONS = (
@@ -51,6 +52,21 @@ def of_a_site(function: F) -> F:
     return function
 
 
+def names_of(given: Mapping[str, Any]) -> list[str]:
+    """Return what the arms are called; raise WrongFile for a cell file that is wrong."""
+    return [given["name"]] if given["cell"] is None else list(cell_of(given["cell"]).members)
+
+
+def cell_of(text: Text) -> Cell:
+    """The cell of a file."""
+    from dobot_async.fleet.cell import parse_cell
+
+    try:
+        return parse_cell(text.text)
+    except ValueError as error:
+        raise WrongFile(f"{text.name}: {error}; nothing was sent") from None
+
+
 def site_of(session: Session, given: Mapping[str, Any]) -> AbstractAsyncContextManager[Site]:
     """Return what connects to the arms.
 
@@ -60,7 +76,6 @@ def site_of(session: Session, given: Mapping[str, Any]) -> AbstractAsyncContextM
         ValueError: A number is out of range.
     """
     from dobot_async import Box, Workspace
-    from dobot_async.fleet.cell import parse_cell
     from dobot_async.remote import open_site
 
     if session.trace:
@@ -73,10 +88,7 @@ def site_of(session: Session, given: Mapping[str, Any]) -> AbstractAsyncContextM
         return open_site(member(session), name=given["name"], **options)
 
     session.refuse("a cell file has the URLs of the arms, and their families", "url", "arm", "token_file")
-    try:
-        return open_site(parse_cell(cell.text), **options)
-    except ValueError as error:
-        raise WrongFile(f"{cell.name}: {error}; nothing was sent") from None
+    return open_site(cell_of(cell), **options)
 
 
 def member(session: Session) -> Member[Any]:

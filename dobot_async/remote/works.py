@@ -87,10 +87,11 @@ class Works:
         try:
             return await self._followed(task, words, tell, gone)
         finally:
-            if not task.done():
-                await cancel_and_join(task)
-
-            del self._going_on[on.name]
+            try:
+                if not task.done():
+                    await cancel_and_join(task)
+            finally:
+                del self._going_on[on.name]
 
     async def stop(self, on: RemoteArm) -> None:
         """Stop an arm now, and end what is being done with it.
