@@ -24,8 +24,8 @@ __all__ = ["names_of", "of_a_site", "site_of", "token_of"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 OPTIONS = (
-    click.option("--cell", type=PROGRAM, help="A cell file (TOML) with several arms, in place of --url."),
-    click.option("--name", default="arm", show_default=True, help="What the arm at --url is called."),
+    click.option("--cell", type=PROGRAM, help="A cell file (TOML), in place of a single arm."),
+    click.option("--name", default="arm", show_default=True, help="What the single arm is called."),
     click.option("--allow-motion", is_flag=True, help="Let others move the arms; else nothing that moves is there."),
     click.option(
         "--speed",

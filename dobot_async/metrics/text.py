@@ -63,7 +63,7 @@ class Figures:
 
     def collect(self) -> Iterator[Metric]:
         """Yield the metrics of all arms."""
-        from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily  # noqa: PLC0415 - it needs an extra
+        from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
         kinds = {GAUGE: GaugeMetricFamily, COUNTER: CounterMetricFamily}
         for row in ROWS:
@@ -99,7 +99,7 @@ def metrics_text(arms: Mapping[str, ArmFigures]) -> bytes:
         ImportError: The extra `metrics` is not installed.
     """
     try:
-        from prometheus_client import CollectorRegistry, generate_latest  # noqa: PLC0415 - it needs an extra
+        from prometheus_client import CollectorRegistry, generate_latest
     except ImportError as error:
         raise ImportError(MISSING, name=error.name) from error
 

@@ -50,6 +50,9 @@ class Gateway:
         discovery: What Home Assistant's topics begin with; "" tells it nothing.
         interval: Seconds between two readings of an arm.
 
+    Attributes:
+        connected: Set while there is a broker.
+
     Raises:
         ValueError: An arm has a name that cannot be a part of a topic; or a number is out of range.
     """
