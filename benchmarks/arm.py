@@ -28,10 +28,10 @@ from typing import Any
 
 from report import BAUD, BITS
 
+from dobot_async.endpoints.line_rate import AtBaud, Wired
+from dobot_async.endpoints.pty import on_pty
 from dobot_async.mycobot import commands as cobot
 from dobot_async.simulator import MyCobotQuirks, Simulation, simulate
-from dobot_async.transports.baud import AtBaud, Wired
-from dobot_async.transports.terminal import on_pty
 
 __all__ = ["AT_ONCE", "Arms", "Clock", "arms", "crowd"]
 

@@ -30,13 +30,14 @@ from multiprocessing.connection import Connection
 
 from report import Row, parsed, show
 
+from dobot_async._core.protocol.transport import Transport
+from dobot_async.arms.magician.frame import Frame, Parser, encode
 from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame, Parser, encode
 from dobot_async.simulator import simulate
-from dobot_async.simulator.ble_rig import forget_bus
-from dobot_async.simulator.radio import Radio, round_trip
-from dobot_async.transports import Transport, open_transport
-from dobot_async.transports.ble import PACE
+from dobot_async.simulator.ble.link_layer import Radio, round_trip
+from dobot_async.simulator.ble.testbed import forget_bus
+from dobot_async.transports import open_transport
+from dobot_async.transports.ble.transport import PACE
 
 RADIOS = [Radio(interval=interval, mtu=mtu) for interval in (0.0075, 0.015, 0.03, 0.05) for mtu in (23, 247)]
 PARAMS = c.SET_PTP_JOINT_PARAMS.request.encode(c.PTPJointParams((200.0,) * 4, (200.0,) * 4))

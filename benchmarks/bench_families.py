@@ -21,8 +21,8 @@ from arm import Arms, arms
 from report import BAUD, Row, parsed, percentile, show
 
 from dobot_async import MyCobot, UltraArm
+from dobot_async.arms.mycobot.arm import GAP
 from dobot_async.mycobot import commands as cobot
-from dobot_async.mycobot.arm import GAP
 from dobot_async.ultraarm import commands as ultra
 
 LISTEN = f"pty:?baud={BAUD}"

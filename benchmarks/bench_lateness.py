@@ -22,8 +22,9 @@ import async_solipsism
 from report import BAUD, BITS, Row, parsed, percentile, show
 
 from dobot_async import Magician, MyCobot, PTPMode, UltraArm
+from dobot_async._core.protocol.transport import Transport
 from dobot_async.simulator import simulate
-from dobot_async.transports import SCHEMES, Transport, open_transport
+from dobot_async.transports import SCHEMES, open_transport
 
 INDEX, ALARMS = (6, 14), (6, 22)  # bytes of question and answer
 FLOOR = (sum(INDEX) / 2 + INDEX[1] + sum(ALARMS)) * BITS / BAUD

@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 from report import Row, parsed, show
 
-from dobot_async.magician.frame import Frame, Parser, encode
+from dobot_async.arms.magician.frame import Frame, Parser, encode
 
 CHUNKS = (1, 20, 64, 4096)
 ROUNDS = 5

@@ -9,9 +9,10 @@ from importlib import import_module
 from typing import Any
 
 HOMES = {
+    "_core.protocol.contract": ("LinkState", "LinkStats", "Unexpected"),
+    "_core.protocol.wire": ("Command",),
     "arms.base": ("Arm",),
     "arms.info": ("DeviceInfo",),
-    "contract": ("LinkState", "LinkStats", "Unexpected"),
     "discovery": ("DiscoveryProblem", "Found", "discover"),
     "errors": (
         "ArmAlarm",
@@ -31,7 +32,6 @@ HOMES = {
     "_core.util.shapes": ("Box", "Cylinder"),
     "_core.util.workspace": ("OutsideWorkspace", "Workspace"),
     "transports": ("open_transport",),
-    "wire": ("Command",),
 }
 """Where each public name is at home, beside those of the families, which say it themselves."""
 
@@ -41,7 +41,7 @@ OWN = {name: f"{__name__}.{module}" for module, names in HOMES.items() for name 
 
 def homes() -> dict[str, str]:
     """The module of each public name, which is imported when the name is first asked for: nobody pays for the rest."""
-    from dobot_async.families import homes as of_families  # noqa: PLC0415 - for the same reason
+    from dobot_async.arms.registry import homes as of_families  # noqa: PLC0415 - for the same reason
 
     return OWN | of_families()
 

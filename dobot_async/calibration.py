@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from random import Random
-from typing import Self, SupportsFloat, cast
+from typing import Any, Self, SupportsFloat, cast
 
 from dobot_async._core.util.arguments import to_float
 from dobot_async._core.util.projective import Pair, Rows, inverse, mapped, solved
@@ -201,7 +201,7 @@ def miss(matrix: Rows, place: Pair, target: Pair) -> float:
 def pair(value: object, name: str) -> Pair:
     """Two numbers, or a pose."""
     if hasattr(value, "x") and hasattr(value, "y"):
-        numbers: list[SupportsFloat] = [value.x, value.y]
+        numbers: list[SupportsFloat] = [cast(Any, value).x, cast(Any, value).y]
     else:
         numbers = list(cast("Iterable[SupportsFloat]", value))[:2]
 

@@ -10,6 +10,7 @@ A row's places are evenly far apart, and so are a column's.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, SupportsFloat, SupportsIndex, cast, overload
@@ -146,7 +147,7 @@ def count(value: object, name: str) -> int:
     if not hasattr(value, "__index__"):
         raise TypeError(f"{name} must be a whole number, not {value!r}")
 
-    found: int = value.__index__()
+    found = operator.index(cast("SupportsIndex", value))
     if found < 1:
         raise ValueError(f"{name} must be 1 or more, not {value!r}")
 

@@ -17,8 +17,8 @@ import pytest
 from virtual import virtual
 
 from dobot_async import Magician
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import FILLER
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import FILLER
 from dobot_async.simulator import Faults, simulate
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"

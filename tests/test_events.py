@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dobot_async.events import BACKLOG, Events, Listener
+from dobot_async._core.util.events import BACKLOG, Events, Listener
 
 pytestmark = pytest.mark.virtual_time
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from dobot_async import Kinematics
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 from dobot_async.simulator import simulate
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

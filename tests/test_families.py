@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from dobot_async.bridged import Bridged
-from dobot_async.families import REGISTERED, Each, Parts, families, homes
-from dobot_async.mycobot.models import MODELS
+from dobot_async.arms.bridge_adapter import Bridged
+from dobot_async.arms.mycobot.models import MODELS
+from dobot_async.arms.registry import REGISTERED, Each, Parts, families, homes
 
 PAGE = Path(__file__).parents[1] / "docs" / "adding-a-family.md"
 PARTS = ("simulator", "scene", "bridge", "discovery", "cli", "fleet", "program")
@@ -54,7 +54,7 @@ def folder(where: Path) -> Path:
 def run(where: Path, program: str) -> str:
     """What a program says in which one line registers the folder."""
     folder(where)
-    line = 'from dobot_async.families import REGISTERED; REGISTERED["turntable"] = "turntable"\n'
+    line = 'from dobot_async.arms.registry import REGISTERED; REGISTERED["turntable"] = "turntable"\n'
     ran = subprocess.run(
         [sys.executable, "-c", line + program], cwd=where, capture_output=True, text=True, timeout=60, check=False
     )
@@ -137,4 +137,4 @@ def test_there_is_nothing_by_another_name() -> None:
 
 
 def test_public_names_are_told_with_their_homes() -> None:
-    assert homes()["UltraArm"] == "dobot_async.ultraarm.arm"
+    assert homes()["UltraArm"] == "dobot_async.arms.ultraarm.arm"

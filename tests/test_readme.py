@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from dobot_async import Magician
-from dobot_async.families import REGISTERED
+from dobot_async.arms.registry import REGISTERED
 from dobot_async.transports import SCHEMES
 
 ROOT = Path(__file__).parents[1]
@@ -54,7 +54,7 @@ def execute(page: Path, source: str, line: int, names: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_blocks_run(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dobot_async.families.REGISTERED", dict(REGISTERED))  # a page registers a family of its own
+    monkeypatch.setattr("dobot_async.arms.registry.REGISTERED", dict(REGISTERED))  # one page adds a family
     names: dict[str, Any] = {"__name__": "__main__"}
     for option, source, line in blocks(page):
         if option == "{fragment}":

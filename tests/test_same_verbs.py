@@ -22,13 +22,13 @@ from dobot_async import (
     ReplyTimeout,
     UltraArm,
 )
+from dobot_async._core.protocol.contract import LinkState
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.queue import MotionQueue
-from dobot_async.contract import LinkState
-from dobot_async.magician import commands as magician
-from dobot_async.mycobot import commands as mycobot
+from dobot_async.arms.magician import commands as magician
+from dobot_async.arms.mycobot import commands as mycobot
+from dobot_async.arms.ultraarm import commands as ultraarm
 from dobot_async.simulator import Faults, simulate
-from dobot_async.ultraarm import commands as ultraarm
-from dobot_async.wire import Command
 
 SHARED = {"control", "queue", "timeout", "on_error", "reconnect", "reply_timeout"}
 FAST, SLOW = 50.0, 0.5

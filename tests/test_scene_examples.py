@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from dobot_async import ColorPort, InfraredPort, Magician
-from dobot_async.magician.commands import AccessoryVersion
+from dobot_async.arms.magician.commands import AccessoryVersion
 from dobot_async.simulator import simulate
 from dobot_async.simulator.scene import Belt, Block, ColorSpot, LightBeam, Mount, PenTool, Piece, Place3, Scene
 

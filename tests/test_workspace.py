@@ -32,12 +32,12 @@ from dobot_async import (
     Workspace,
 )
 from dobot_async._core.util.shapes import Shape
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.mycobot import commands as mycobot
+from dobot_async.arms.ultraarm import commands as ultraarm
 from dobot_async.fleet import Member
-from dobot_async.magician import commands as c
-from dobot_async.mycobot import commands as mycobot
 from dobot_async.simulator import DeviceOptions, Simulation, simulate
-from dobot_async.simulator.ultraarm_body import forward
-from dobot_async.ultraarm import commands as ultraarm
+from dobot_async.simulator.ultraarm.kinematics import forward
 
 XYZ = tuple[float, float, float]
 NEAR = 0.2  # mm by which a way between two places that are looked at may be off

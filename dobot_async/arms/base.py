@@ -16,10 +16,10 @@ from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol, TypeVar
 
 from dobot_async._core.link.link import Link
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.motion import Motion
 from dobot_async.arms.info import DeviceInfo
 from dobot_async.following import Follow
-from dobot_async.wire import Command
 
 __all__ = ["Arm", "ArmBatch", "ArmPose", "ArmQueue", "ArmVerbs"]
 
@@ -34,18 +34,22 @@ class ArmPose(Protocol):
     @property
     def x(self) -> float:
         """In mm."""
+        ...
 
     @property
     def y(self) -> float:
         """In mm."""
+        ...
 
     @property
     def z(self) -> float:
         """In mm."""
+        ...
 
     @property
     def joints(self) -> tuple[float, ...]:
         """In degrees."""
+        ...
 
 
 class ArmVerbs(Protocol[T_co]):
@@ -59,6 +63,7 @@ class ArmVerbs(Protocol[T_co]):
 
     def home(self, *, timeout: float | None = None) -> T_co:
         """Drive to the home position, where the arm finds its place if it has to."""
+        ...
 
     def move_to(
         self,
@@ -69,25 +74,32 @@ class ArmVerbs(Protocol[T_co]):
         timeout: float | None = None,
     ) -> T_co:
         """Move the tool to a point, mm; coordinates that are not given stay as they are."""
+        ...
 
     def move_by(self, x: float = 0.0, y: float = 0.0, z: float = 0.0, *, timeout: float | None = None) -> T_co:
         """Move the tool by mm from where it will be then."""
+        ...
 
     @property
     def move_joints(self) -> Callable[..., T_co]:
         """Move the joints to angles in degrees, as many as the arm has; takes `timeout=` too."""
+        ...
 
     def wait(self, seconds: float, *, timeout: float | None = None) -> T_co:
         """Hold the queue for a time, 0 s or more."""
+        ...
 
     def gripper(self, closed: bool, *, timeout: float | None = None) -> T_co:
         """Close or open the gripper."""
+        ...
 
     def gripper_to(self, percent: float, *, timeout: float | None = None) -> T_co:
         """Open the gripper to 0 (closed) to 100 (open) percent."""
+        ...
 
     def suction(self, on: bool, *, timeout: float | None = None) -> T_co:
         """Suck, or let go."""
+        ...
 
 
 class ArmBatch(ArmVerbs[Motion], Protocol):
@@ -100,6 +112,7 @@ class ArmQueue(ArmVerbs[Coroutine[Any, Any, Motion]], Protocol):
     @property
     def pending(self) -> int:
         """How many accepted commands are not known to have ended."""
+        ...
 
     @property
     def outcomes(self) -> Mapping[str, int]:
@@ -107,9 +120,11 @@ class ArmQueue(ArmVerbs[Coroutine[Any, Any, Motion]], Protocol):
 
     async def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
         """Queue any row of the command table that may be queued."""
+        ...
 
     def batch(self, *, timeout: float | None = None) -> AbstractAsyncContextManager[ArmBatch]:
         """Collect commands, and send them with nothing between them when the block ends."""
+        ...
 
     async def join(self, timeout: float | None = None) -> None:
         """Return when all that was put has been executed; raise the first failure since the last `join`."""
@@ -133,25 +148,32 @@ class Arm(ArmVerbs[Coroutine[Any, Any, None]], Protocol):
     @property
     def link(self) -> Link[Any]:
         """The connection, with its state, events and figures."""
+        ...
 
     @property
     def queue(self) -> ArmQueue:
         """The queue of the arm's motions, with the same verbs."""
+        ...
 
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
         """Send any row of the family's command table at once, and return the arm's answer."""
+        ...
 
     async def get_pose(self, *, timeout: float | None = None) -> ArmPose:
         """Return where the tool is."""
+        ...
 
     async def get_joints(self, *, timeout: float | None = None) -> tuple[float, ...]:
         """Return the joints, degrees."""
+        ...
 
     async def get_info(self, *, timeout: float | None = None) -> DeviceInfo:
         """Return serial number, name and firmware version; "" for what the arm does not tell."""
+        ...
 
     async def get_alarms(self, *, timeout: float | None = None) -> tuple[object, ...]:
         """Return what keeps the arm from moving, in words when printed."""
+        ...
 
     async def clear_alarms(self, *, timeout: float | None = None) -> None:
         """Clear the alarms; what the arm was doing when they came up does not go on."""
@@ -164,10 +186,12 @@ class Arm(ArmVerbs[Coroutine[Any, Any, None]], Protocol):
 
     def jogging(self, direction: str) -> AbstractAsyncContextManager[None]:
         """Jog until the block ends, however it ends."""
+        ...
 
     @property
     def following(self) -> Callable[..., AbstractAsyncContextManager[Follow]]:
         """Let the arm follow a target for the length of a block; takes `rate=`, `max_speed=`, `max_turn=`, `stale=`."""
+        ...
 
     async def stop(self, *, timeout: float = ...) -> None:
         """Stop the arm now, ahead of everything; pending Motions raise MotionStopped."""

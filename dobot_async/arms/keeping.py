@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 
 from dobot_async._core.util.tasks import cancel_and_join
@@ -23,7 +23,7 @@ async def kept_inside(
     place: Callable[[], Awaitable[Sequence[float]]],
     halt: Callable[[], Awaitable[None]],
     what: str,
-) -> AsyncIterator[None]:
+) -> AsyncGenerator[None]:
     """Watch a jog while the block lasts, and stop it before the tool leaves the workspace, or goes further out.
 
     Args:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from typing import Any, Protocol, TypeVar
 
 from dobot_async._core.link.link import Link
+from dobot_async._core.protocol.transport import Transport
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_choice, check_duration, check_timeout
 from dobot_async._core.util.tasks import Cleanup, run_shielded
+from dobot_async._core.util.urls import hidden
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTimeout
-from dobot_async.transports import Transport, hidden, open_transport
-from dobot_async.wire import Command
+from dobot_async.transports import open_transport
 
 __all__ = ["arm_session", "check_options", "open_in_time", "run_owned"]
 
@@ -29,10 +31,12 @@ class Session(Protocol):
     @property
     def link(self) -> Link[Any]:
         """The connection."""
+        ...
 
     @property
     def queue(self) -> MotionQueue:
         """The queue of its motions."""
+        ...
 
     async def greet(self, timeout: float) -> None:
         """Prove that the arm answers; raise ConnectFailed, with what to check, if it does not in so many seconds."""
@@ -71,7 +75,7 @@ async def arm_session(
     build: Callable[[Transport, str], S],
     *,
     stop_on_error: bool,
-) -> AsyncIterator[S]:
+) -> AsyncGenerator[S]:
     """Connect to an arm, hold it for the length of a block, and leave it.
 
     Args:

@@ -20,10 +20,10 @@ from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
 from dobot_async._core.link.admission import Admission
+from dobot_async._core.protocol.contract import Frame
+from dobot_async.arms.bridge_adapter import Bridged, Kind, Watch
 from dobot_async.bridge.desk import Desk, Refused, Request
 from dobot_async.bridge.limits import Allowance, Limits
-from dobot_async.bridged import Bridged, Kind, Watch
-from dobot_async.contract import Frame
 from dobot_async.errors import DobotError
 
 __all__ = ["Client"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from dobot_async.bridged import Kind
-from dobot_async.contract import Frame
+from dobot_async._core.protocol.contract import Frame
+from dobot_async.arms.bridge_adapter import Kind
 
 if TYPE_CHECKING:
     from dobot_async.bridge.client import Client
@@ -51,6 +51,7 @@ class Desk(Protocol[F]):
 
     async def answer(self, client: Client[F], request: Request[F]) -> F | None:
         """Returns the arm's reply, None where the arm need not answer; raises Refused, or DobotError."""
+        ...
 
     def refused(self, client: Client[F], name: str, reason: str) -> None:
         """Takes note that a request was not passed on."""

@@ -22,6 +22,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
+from dobot_async._core.protocol.transport import MANY
+from dobot_async._core.util.urls import hidden
 from dobot_async.bridge.handshake import (
     LONGEST_LINE,
     TOKEN,
@@ -31,13 +33,11 @@ from dobot_async.bridge.handshake import (
     TokenHandshake,
 )
 from dobot_async.bridge.service import Bridge
+from dobot_async.endpoints.listeners import on_tcp, on_udp
+from dobot_async.endpoints.pty import on_pty
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports import hidden
-from dobot_async.transports.base import MANY
-from dobot_async.transports.listen import on_tcp, on_udp
 from dobot_async.transports.network import TOKEN as TOKEN_OPTION
 from dobot_async.transports.network import secret
-from dobot_async.transports.terminal import on_pty
 
 __all__ = ["Doors", "open_doors"]
 
@@ -101,7 +101,7 @@ async def open_doors(
     `refuse` is called with who was not let in, and why.
     """
     authenticator = Authenticator(doors.token, doors.origins, host.family.begins, refuse)
-    urls = []
+    urls: list[str] = []
     for place in doors.places:
         address, port = place.hostname or "", place.port or 0
         try:

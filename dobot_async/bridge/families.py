@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from dobot_async.bridged import Bridged
-from dobot_async.families import Parts
+from dobot_async.arms.bridge_adapter import Bridged
+from dobot_async.arms.registry import Parts
 
 __all__ = ["FAMILIES", "family_of"]
 

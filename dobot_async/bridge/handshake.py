@@ -19,7 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from dobot_async.transports.listen import Host, Peer
+from dobot_async.endpoints.listeners import Host, Peer
 from dobot_async.transports.network import LONGEST_TOKEN
 
 __all__ = [

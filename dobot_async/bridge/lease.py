@@ -20,10 +20,12 @@ class Holder(Protocol):
     @property
     def name(self) -> str:
         """Who it is, for people."""
+        ...
 
     @property
     def gone(self) -> bool:
         """Whether it has gone, or was cut off."""
+        ...
 
 
 H = TypeVar("H", bound=Holder)

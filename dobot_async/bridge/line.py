@@ -8,8 +8,8 @@ from functools import partial
 from typing import Generic, TypeVar
 
 from dobot_async._core.link.link import Link
-from dobot_async.bridged import Bridged
-from dobot_async.contract import Frame
+from dobot_async._core.protocol.contract import Frame
+from dobot_async.arms.bridge_adapter import Bridged
 from dobot_async.errors import ConnectionLost, ReplyTimeout
 
 __all__ = ["Line"]

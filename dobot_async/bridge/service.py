@@ -25,17 +25,17 @@ from typing import Any, Generic, Literal, TypeVar
 
 from dobot_async._core.link.admission import Priority
 from dobot_async._core.link.link import Link
+from dobot_async._core.protocol.contract import Frame, LinkState
+from dobot_async._core.util.events import Events
 from dobot_async._core.util.text import printable
+from dobot_async.arms.bridge_adapter import Bridged, Kind
 from dobot_async.bridge.client import Client
 from dobot_async.bridge.desk import Refused, Request
 from dobot_async.bridge.lease import Lease
 from dobot_async.bridge.limits import Allowance, Limits
 from dobot_async.bridge.line import Line
 from dobot_async.bridge.standstill import Standstill
-from dobot_async.bridged import Bridged, Kind
-from dobot_async.contract import Frame, LinkState
 from dobot_async.errors import ProtocolError, ReplyTimeout
-from dobot_async.events import Events
 
 __all__ = ["Bridge", "BridgeEvent"]
 

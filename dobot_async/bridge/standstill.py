@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import operator
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Generic, TypeVar
 
+from dobot_async._core.protocol.contract import Frame
+from dobot_async.arms.bridge_adapter import Bridged
 from dobot_async.bridge.client import Client
 from dobot_async.bridge.line import Line
-from dobot_async.bridged import Bridged
-from dobot_async.contract import Frame
 from dobot_async.errors import ConnectionLost, DobotError
 
 __all__ = ["Standstill"]
@@ -55,7 +54,9 @@ class Standstill(Generic[F]):
         for attempt in itertools.count():
             frames = [*(family.stopping if attempt < GENTLY else family.insisting), *off]
             answered = await self._line.stop(frames)
-            told = attempt > GENTLY or all(map(operator.or_, answered, map(family.may_be_silent, frames)))
+            told = attempt > GENTLY or all(
+                heard or family.may_be_silent(frame) for heard, frame in zip(answered, frames, strict=True)
+            )
             obeys = answered[0] if family.proves_stop else await self._is_seen_to_stand(holder, frames, answered)
             if final and obeys and told:
                 self._tell("stopped", holder, "it has gone, and the arm was in motion")

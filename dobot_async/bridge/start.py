@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Collection, Sequence
+from collections.abc import AsyncGenerator, Collection, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from dobot_async._core.link.link import Link
+from dobot_async._core.protocol.contract import Frame
 from dobot_async._core.util.tasks import run_shielded
+from dobot_async.arms.bridge_adapter import Bridged
 from dobot_async.bridge.doors import Doors, open_doors
 from dobot_async.bridge.families import family_of
 from dobot_async.bridge.limits import Limits
 from dobot_async.bridge.service import Bridge
-from dobot_async.bridged import Bridged
-from dobot_async.contract import Frame
 from dobot_async.errors import ConnectFailed, DobotError
 
 __all__ = ["bridge"]
@@ -38,7 +38,7 @@ async def bridge(
     limits: Limits | None = None,
     family: str = "magician",
     timeout: float = 5.0,
-) -> AsyncIterator[Bridge[Any]]:
+) -> AsyncGenerator[Bridge[Any]]:
     """Gives an arm to programs on a network for the length of a block.
 
     Args:

@@ -15,11 +15,11 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from dobot_async.arms.bridge_adapter import Reading
 from dobot_async.bridge.service import Bridge
-from dobot_async.bridged import Reading
 from dobot_async.errors import DobotError
-from dobot_async.transports.zenoh_place import library
-from dobot_async.transports.zenoh_session import Keys, Session
+from dobot_async.transports.zenoh.config import library
+from dobot_async.transports.zenoh.session import Keys, Session
 
 __all__ = ["LINK_PERIOD", "Telemetry"]
 

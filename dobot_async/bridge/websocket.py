@@ -176,7 +176,7 @@ def presented(request: Any) -> str | None:
         return str(headers[-1]).removeprefix(BEARER)
 
     with suppress(ValueError):  # a path that is none
-        tokens = parse_qs(urlsplit(request.path).query).get("token", [])
+        tokens = parse_qs(urlsplit(str(request.path)).query).get("token", [])
         return tokens[-1] if tokens else None
 
     return None

@@ -1,4 +1,4 @@
-"""The Zenoh door: an arm under a name, found by its liveliness token; see `dobot_async.transports.zenoh_session`.
+"""The Zenoh door: an arm under a name, found by its liveliness token; see `dobot_async.transports.zenoh.session`.
 
     token of a client + its query --> let in --> messages --> Host.client(...).send
     its token goes                --> Host.leave, as if a line were cut
@@ -26,9 +26,9 @@ from dobot_async.bridge.limits import Allowance
 from dobot_async.bridge.service import Bridge
 from dobot_async.bridge.telemetry import Telemetry
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.zenoh_messages import DATA, END, Lost, Numbered, Outbox
-from dobot_async.transports.zenoh_place import Place, address, library
-from dobot_async.transports.zenoh_session import VERSION, Keys, Session
+from dobot_async.transports.zenoh.config import Place, address, library
+from dobot_async.transports.zenoh.messages import DATA, END, Lost, Numbered, Outbox
+from dobot_async.transports.zenoh.session import VERSION, Keys, Session
 
 if TYPE_CHECKING:
     import zenoh
@@ -282,7 +282,7 @@ def introduction(query: zenoh.Query) -> str | None:
     """What a client calls itself, for people; None if it speaks another version."""
     payload = query.payload.to_bytes() if query.payload else b""
     with suppress(ValueError, AttributeError, RecursionError):
-        told = json.loads(payload) if len(payload) <= LONGEST_INTRODUCTION else {}
+        told: Any = json.loads(payload) if len(payload) <= LONGEST_INTRODUCTION else {}
         if told.get("version") == VERSION:
             return printable(str(told.get("who", "")), LONGEST_NAME)
 

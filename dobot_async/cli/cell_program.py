@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dobot_async.cli.failures import StepRefused
-from dobot_async.cli.program import execute
+from dobot_async.cli.program_files import execute
 from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell
 from dobot_async.fleet.families import family_of
@@ -71,7 +71,7 @@ def parse_cell_program(lines: Iterable[str], cell: Cell) -> CellProgram:
     """
     barriers: dict[str, tuple[str, ...]] = {}
     parts = {name: Part(name, member, cell, barriers) for name, member in cell.members.items()}
-    problems = []
+    problems: list[tuple[int, str]] = []
     for number, written in enumerate(lines, 1):
         text = bare(written)
         if not text:

@@ -8,13 +8,15 @@ from typing import Any
 
 import click
 
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.magician.kinematics import Kinematics
+from dobot_async.arms.magician.params import EndEffectorParams
+from dobot_async.arms.mycobot.models import model_of
+from dobot_async.arms.ultraarm.arm import UltraArm
+from dobot_async.arms.ultraarm.limits import MANUAL_LIMITS
 from dobot_async.cli.drawing_options import Begin
 from dobot_async.cli.failures import StepRefused, WrongFile
 from dobot_async.cli.session import Session
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.kinematics import Kinematics
-from dobot_async.magician.params import EndEffectorParams
-from dobot_async.mycobot.models import model_of
 from dobot_async.toolpath import (
     Drawing,
     Progress,
@@ -27,8 +29,6 @@ from dobot_async.toolpath import (
     reachable,
 )
 from dobot_async.toolpath.moves import Tool
-from dobot_async.ultraarm.arm import UltraArm
-from dobot_async.ultraarm.params import MANUAL_LIMITS
 
 __all__ = ["Job"]
 

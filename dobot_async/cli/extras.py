@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 import click
@@ -11,7 +11,7 @@ __all__ = ["needing"]
 
 
 @contextmanager
-def needing(extra: str) -> Iterator[None]:
+def needing(extra: str) -> Generator[None]:
     """While this is entered, a library that is missing ends the command, with the extra that has it."""
     try:
         yield

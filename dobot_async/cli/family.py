@@ -26,6 +26,7 @@ class Reading(Protocol):
     @property
     def rows(self) -> Mapping[str, str]:
         """What a person wants to see of it."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

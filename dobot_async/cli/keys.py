@@ -15,7 +15,7 @@ import os
 import re
 import sys
 from collections import deque
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncGenerator, Generator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from typing import Any, NamedTuple
 
@@ -155,7 +155,7 @@ class Keys:
 
 
 @contextmanager
-def keys_of(stream: Any = None) -> Iterator[Keys]:
+def keys_of(stream: Any = None) -> Generator[Keys]:
     """Read the keys of a terminal for the length of a block, standard input's by default.
 
     Ctrl-C interrupts as ever. Ctrl-Z and Ctrl-S do nothing: a program that is suspended, or whose terminal stands,
@@ -189,7 +189,7 @@ def keys_of(stream: Any = None) -> Iterator[Keys]:
 
 
 @asynccontextmanager
-async def until_a_key() -> AsyncIterator[None]:
+async def until_a_key() -> AsyncGenerator[None]:
     """Leave the block, in good order, when a key is pressed on the terminal, if standard input is one."""
     if sys.stdin is None or not sys.stdin.isatty():
         yield

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dobot_async.arms.registry import Parts
 from dobot_async.cli.failures import FAILED, OUTPUT_CLOSED, Interrupted
 from dobot_async.errors import DobotError
-from dobot_async.families import Parts
 
 if TYPE_CHECKING:
     from dobot_async.cli.session import Session
@@ -27,36 +27,36 @@ __all__ = ["COMMANDS", "cli"]
 SILENT = logging.NullHandler()
 
 COMMANDS = {
-    "alarms": ("dobot_async.cli.commands:alarms", "Tell the alarms, with cause and remedy."),
-    "bridge": ("dobot_async.cli.bridge:bridge", "Give an arm to programs on a network."),
-    "cell": ("dobot_async.cli.cell:cell", "Drive all arms of a cell, or watch them."),
-    "decode": ("dobot_async.cli.decode:decode", "Decode the bytes of frames, or lines of text."),
-    "demo": ("dobot_async.cli.demo:demo", "Let a simulated arm pick and place."),
+    "alarms": ("dobot_async.cli.commands.basics:alarms", "Tell the alarms, with cause and remedy."),
+    "bridge": ("dobot_async.cli.commands.bridge:bridge", "Give an arm to programs on a network."),
+    "cell": ("dobot_async.cli.commands.cell:cell", "Drive all arms of a cell, or watch them."),
+    "decode": ("dobot_async.cli.commands.decode:decode", "Decode the bytes of frames, or lines of text."),
+    "demo": ("dobot_async.cli.commands.demo:demo", "Let a simulated arm pick and place."),
     "discover": (
-        "dobot_async.cli.discover:discover_arms",
+        "dobot_async.cli.commands.discover:discover_arms",
         "Search for arms on USB, in the Wi-Fi, over BLE and on Zenoh.",
     ),
-    "draw": ("dobot_async.cli.drawing:draw_file", "Draw a file with a pen: SVG, DXF, G-code, a picture."),
-    "engrave": ("dobot_async.cli.drawing:engrave_file", "Engrave a picture or a drawing with the laser."),
-    "gcode": ("dobot_async.cli.gcode:gcode", "Run a G-code file on an ultraarm."),
-    "home": ("dobot_async.cli.commands:home", "Drive home, which calibrates the arm."),
-    "info": ("dobot_async.cli.commands:info", "Tell who the arm is."),
-    "jog": ("dobot_async.cli.commands:jog", "Jog in a direction for a time."),
-    "mcp": ("dobot_async.cli.mcp:mcp", "Give an arm to language models, by MCP."),
-    "monitor": ("dobot_async.cli.monitor:monitor", "Watch pose, queue and alarms."),
-    "move": ("dobot_async.cli.commands:move", "Move the tool to a point."),
-    "mqtt": ("dobot_async.cli.mqtt:mqtt", "Tell a message broker of an arm, for Home Assistant."),
-    "play": ("dobot_async.cli.teach:play_recording", "Play what an arm was taught."),
-    "pose": ("dobot_async.cli.commands:pose", "Tell where tool and joints are, in mm and degrees."),
-    "run": ("dobot_async.cli.program:run_program", "Run a program file."),
-    "serve": ("dobot_async.cli.serve:serve_on_zenoh", "Put an arm on Zenoh, under a name."),
-    "simulate": ("dobot_async.cli.simulate:simulate", "Simulate an arm until Ctrl-C."),
-    "stop": ("dobot_async.cli.commands:stop", "Stop the arm now, and empty its queue."),
-    "suction": ("dobot_async.cli.commands:suction", "Switch the suction cup."),
-    "write": ("dobot_async.cli.drawing:write_line", "Write a text with a pen."),
-    "teleop": ("dobot_async.cli.teleop:teleop", "Lead the arm by keys, or by targets from a pipe."),
-    "teach": ("dobot_async.cli.teach:teach", "Teach the arm, and keep that in a file."),
-    "wifi": ("dobot_async.cli.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
+    "draw": ("dobot_async.cli.commands.drawing:draw_file", "Draw a file with a pen: SVG, DXF, G-code, a picture."),
+    "engrave": ("dobot_async.cli.commands.drawing:engrave_file", "Engrave a picture or a drawing with the laser."),
+    "gcode": ("dobot_async.cli.commands.gcode:gcode", "Run a G-code file on an ultraarm."),
+    "home": ("dobot_async.cli.commands.basics:home", "Drive home, which calibrates the arm."),
+    "info": ("dobot_async.cli.commands.basics:info", "Tell who the arm is."),
+    "jog": ("dobot_async.cli.commands.basics:jog", "Jog in a direction for a time."),
+    "mcp": ("dobot_async.cli.commands.mcp:mcp", "Give an arm to language models, by MCP."),
+    "monitor": ("dobot_async.cli.commands.monitor:monitor", "Watch pose, queue and alarms."),
+    "move": ("dobot_async.cli.commands.basics:move", "Move the tool to a point."),
+    "mqtt": ("dobot_async.cli.commands.mqtt:mqtt", "Tell a message broker of an arm, for Home Assistant."),
+    "play": ("dobot_async.cli.commands.teach:play_recording", "Play what an arm was taught."),
+    "pose": ("dobot_async.cli.commands.basics:pose", "Tell where tool and joints are, in mm and degrees."),
+    "run": ("dobot_async.cli.commands.program:run_program", "Run a program file."),
+    "serve": ("dobot_async.cli.commands.serve:serve_on_zenoh", "Put an arm on Zenoh, under a name."),
+    "simulate": ("dobot_async.cli.commands.simulate:simulate", "Simulate an arm until Ctrl-C."),
+    "stop": ("dobot_async.cli.commands.basics:stop", "Stop the arm now, and empty its queue."),
+    "suction": ("dobot_async.cli.commands.basics:suction", "Switch the suction cup."),
+    "write": ("dobot_async.cli.commands.drawing:write_line", "Write a text with a pen."),
+    "teleop": ("dobot_async.cli.commands.teleop:teleop", "Lead the arm by keys, or by targets from a pipe."),
+    "teach": ("dobot_async.cli.commands.teach:teach", "Teach the arm, and keep that in a file."),
+    "wifi": ("dobot_async.cli.commands.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
 }
 """Where each command is, and what the help says of it."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
@@ -56,7 +56,7 @@ class Output:
                 self.answer({"error": type(error).__name__, "message": message, "alarms": alarms}, "")
 
     @contextmanager
-    def working(self, what: str) -> Iterator[None]:
+    def working(self, what: str) -> Generator[None]:
         """Shows on a terminal that something goes on, for the length of a block."""
         if not self.terminal:
             yield
@@ -69,7 +69,7 @@ class Output:
             yield
 
     @contextmanager
-    def counting(self, what: str, total: int) -> Iterator[Callable[[int], None]]:
+    def counting(self, what: str, total: int) -> Generator[Callable[[int], None]]:
         """Shows on a terminal how much of something is done, for the length of a block; yields what to tell it by."""
         if not self.terminal:
             yield lambda _: None
@@ -83,7 +83,7 @@ class Output:
             yield lambda done: bar.update(task, completed=done)
 
     @contextmanager
-    def panel(self) -> Iterator[Callable[[Mapping[str, str]], None]]:
+    def panel(self) -> Generator[Callable[[Mapping[str, str]], None]]:
         """Draws named lines in place on a terminal, for the length of a block; yields what to draw them with."""
         from rich.live import Live
         from rich.table import Table
@@ -99,7 +99,7 @@ class Output:
             yield draw
 
     @contextmanager
-    def table(self, columns: Sequence[str]) -> Iterator[Callable[[Sequence[Sequence[str]]], None]]:
+    def table(self, columns: Sequence[str]) -> Generator[Callable[[Sequence[Sequence[str]]], None]]:
         """Draws a table in place on a terminal, for the length of a block; yields what to draw its rows with."""
         from rich.live import Live
         from rich.table import Table

@@ -5,9 +5,10 @@ from __future__ import annotations
 import errno
 import math
 import sys
+from contextlib import suppress
 from ipaddress import IPv4Address
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import click
 
@@ -42,13 +43,12 @@ class Place(click.ParamType[tuple[str, int]]):
         from dobot_async.discovery.wifi import PORT
 
         if isinstance(value, tuple):
-            return value
+            return cast("tuple[str, int]", value)
 
         host, _, written = value.partition(":")
-        try:
+        address, port = host, -1
+        with suppress(ValueError):
             address, port = str(IPv4Address(host)), int(written or PORT)
-        except ValueError:
-            port = -1
 
         if port not in PORTS:
             self.fail(f"{value!r} is no IPv4 address such as 192.168.1.255, or 192.168.1.255:{PORT}", param, ctx)

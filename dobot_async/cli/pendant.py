@@ -56,7 +56,7 @@ class Pendant:
     by_joints: bool = False
     joint: int = 4
     by_lines: bool = False
-    tools: dict[str, bool] = field(default_factory=dict)
+    tools: dict[str, bool] = field(default_factory=dict[str, bool])
 
     async def run(self) -> None:
         """Do what the keys say, until q, or until the terminal is closed."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -54,7 +54,7 @@ class Session:
     output: Output
     commanding: bool = False
     token_file: Path | None = None
-    given: set[str] = field(default_factory=set)
+    given: set[str] = field(default_factory=set[str])
 
     @property
     def family(self) -> Family:
@@ -112,7 +112,7 @@ class Session:
         control: bool = True,
         queue: Literal["fresh", "keep"] = "fresh",
         on_error: Literal["stop", "leave"] = "stop",
-    ) -> AsyncIterator[Any]:
+    ) -> AsyncGenerator[Any]:
         """Connects to the session's arm, or to a URL, with the trace that was asked for."""
         url = url or self.target()
         with tracing(self.trace) as trace:

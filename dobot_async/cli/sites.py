@@ -83,7 +83,7 @@ def site_of(session: Session, given: Mapping[str, Any]) -> AbstractAsyncContextM
 
     edges, cell = given["workspace"], given["cell"]
     workspace = Workspace(Box(*(edges[at : at + 2] for at in (0, 2, 4)))) if edges else None
-    options = {"allow_motion": given["allow_motion"], "speed": given["speed"], "workspace": workspace}
+    options: dict[str, Any] = {"allow_motion": given["allow_motion"], "speed": given["speed"], "workspace": workspace}
     if cell is None:
         return open_site(member(session), name=given["name"], **options)
 

@@ -9,7 +9,7 @@ import errno
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
@@ -23,7 +23,7 @@ MASK = "***"
 
 
 @contextmanager
-def tracing(path: str | None) -> Iterator[TraceFile | None]:
+def tracing(path: str | None) -> Generator[TraceFile | None]:
     """Opens the file of a trace for the length of a block; "-" is standard error, None is no trace."""
     if path is None:
         yield None

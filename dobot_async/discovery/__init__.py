@@ -156,7 +156,7 @@ async def probed(
 
 async def asked(found: Found, families: Iterable[Family], timeout: float) -> Found:
     """Asks what was found who it is: as each family that it can be, until it answers."""
-    problems = []
+    problems: list[str] = []
     for family in families:
         if family.probe and family.name in found.families:
             try:

@@ -11,7 +11,7 @@ from dobot_async.discovery.found import Found, printable
 from dobot_async.errors import ConnectFailed
 
 if TYPE_CHECKING:
-    from dobot_async.transports.ble_scan import Seen
+    from dobot_async.transports.ble.scan import Seen
 
 __all__ = ["BLEModules"]
 
@@ -35,8 +35,8 @@ class BLEModules:
         Raises:
             ConnectFailed: There is no Bluetooth, or it is off, or may not be used; the message says what to do.
         """
-        from dobot_async.transports.ble_advice import trouble
-        from dobot_async.transports.ble_scan import connected, listening
+        from dobot_async.transports.ble.diagnostics import trouble
+        from dobot_async.transports.ble.scan import connected, listening
 
         end = asyncio.get_running_loop().time() + timeout
         names: dict[str, str] = {}

@@ -11,11 +11,11 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from dobot_async.arms.info import DeviceInfo
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.registry import Each
+from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import CommandRejected, ConnectFailed
-from dobot_async.families import Each
-from dobot_async.magician.arm import Magician
-from dobot_async.mycobot.arm import MyCobot
-from dobot_async.ultraarm.arm import UltraArm
 
 __all__ = ["CH340", "CH9102", "CP210X", "FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "Family"]
 

@@ -65,10 +65,12 @@ class Source(Protocol):
     @property
     def name(self) -> str:
         """See above."""
+        ...
 
     @property
     def probes_at_once(self) -> int:
         """See above."""
+        ...
 
     def search(self, timeout: float) -> AsyncGenerator[Found, None]:
         """Yields what is found, at once; ends after `timeout` seconds, or when there is nothing more to find.
@@ -76,6 +78,7 @@ class Source(Protocol):
         What has the same `identity` as an earlier one takes its place. Any exception ends the search; what was
         yielded before it stays.
         """
+        ...
 
 
 def natural(text: str) -> tuple[list[tuple[int, str]], str]:

@@ -35,7 +35,7 @@ def broadcast_addresses() -> list[str]:
     """Returns the broadcast address of each interface that is up and has one; Linux only."""
     import fcntl
 
-    found = []
+    found: list[str] = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as query:
         for _, name in socket.if_nameindex():
             request = struct.pack("256s", name.encode())

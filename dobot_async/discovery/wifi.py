@@ -54,7 +54,8 @@ class WiFiModules:
         end = asyncio.get_running_loop().time() + timeout
         async with AsyncExitStack() as stack:
             ear = Ear()
-            mouths, refused = [], []
+            mouths: list[tuple[Any, tuple[str, int]]] = []
+            refused: list[OSError] = []
             for own, target in ways:
                 try:
                     mouths.append((await ear.open(own, stack), target))

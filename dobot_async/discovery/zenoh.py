@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dobot_async.discovery.found import Found
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.zenoh_place import NAME, address
+from dobot_async.transports.zenoh.config import NAME, address
 
 if TYPE_CHECKING:
     import zenoh
@@ -42,8 +42,8 @@ class ZenohArms:
             ValueError: The configuration is no good.
             ConnectFailed: There is no Zenoh, or it cannot be started.
         """
-        from dobot_async.transports.zenoh_place import Place, library
-        from dobot_async.transports.zenoh_session import Keys, Session
+        from dobot_async.transports.zenoh.config import Place, library
+        from dobot_async.transports.zenoh.session import Keys, Session
 
         try:
             library()

@@ -7,7 +7,7 @@ can never be granted, for the arms start at one instant: that is told at once.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from itertools import combinations
 from typing import Any
@@ -24,7 +24,7 @@ __all__ = ["admit_together", "turns"]
 
 
 @asynccontextmanager
-async def turns(seats: Mapping[str, Seat]) -> AsyncIterator[None]:
+async def turns(seats: Mapping[str, Seat]) -> AsyncGenerator[None]:
     """While this is entered, nobody else commands these arms. They are taken in one order, by whomever."""
     async with AsyncExitStack() as stack:
         for name in sorted(seats):

@@ -27,7 +27,7 @@ class Gathering:
     """
 
     parties: frozenset[str]
-    waiting: dict[asyncio.Future[str], Party | None] = field(default_factory=dict)
+    waiting: dict[asyncio.Future[str], Party | None] = field(default_factory=dict[asyncio.Future[str], Party | None])
     broken: str = ""
 
     def absent(self, run: Mapping[str, Party], arrived: asyncio.Future[str]) -> list[Party]:

@@ -32,13 +32,14 @@ from typing import Any, NoReturn, cast
 from urllib.parse import urlsplit
 
 from dobot_async._core.util.shapes import Box, Cylinder, Shape
+from dobot_async._core.util.urls import hidden
+from dobot_async.arms.registry import families
 from dobot_async.arms.session import check_options
-from dobot_async.families import families
 from dobot_async.fleet.families import FAMILIES, AnyArm
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.seat import Member
 from dobot_async.program.text import read_text, shortened
-from dobot_async.transports import SCHEMES, hidden
+from dobot_async.transports import SCHEMES
 
 __all__ = ["Cell", "parse_cell", "read_cell"]
 
@@ -136,7 +137,7 @@ def connect_options(family: str, kind: type[Any], table: Mapping[str, Any]) -> d
     if model is not None and model not in words:
         raise ValueError(f"model: one of {', '.join(words[1:])}, not {model!r}")
 
-    given = {**defaults, **found}
+    given: dict[str, Any] = {**defaults, **found}
     check_options(given["queue"], given["on_error"], given["timeout"], given["reply_timeout"])
     return found
 
@@ -256,17 +257,18 @@ def known(table: Mapping[str, Any], names: Collection[str], what: str) -> None:
 
 def tables(value: Any, name: str) -> Mapping[str, Mapping[str, Any]]:
     """A table of tables."""
-    if not isinstance(value, dict) or not all(isinstance(each, dict) for each in value.values()):
+    found: dict[str, Any] = value if isinstance(value, dict) else {"": value}
+    if not all(isinstance(each, dict) for each in found.values()):
         raise ValueError(f"{name}: expected tables, such as [{name}.NAME]")
 
-    return value
+    return found
 
 
 def sub(table: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """A table in a table; empty if it is not there."""
     value = table.get(name, {})
     if isinstance(value, dict):
-        return value
+        return cast("dict[str, Any]", value)
 
     raise ValueError(f"{name}: expected a table, such as {name} = {{ ... }}, not {value!r}")
 
@@ -294,7 +296,7 @@ def number(table: Mapping[str, Any], name: str, default: float | None = None) ->
 
 def span(table: Mapping[str, Any], name: str) -> tuple[float, float]:
     """Two numbers."""
-    value = table[name]
+    value: list[Any] = table[name]
     if not isinstance(value, list) or len(value) != 2:
         raise ValueError(f"{name}: expected [lowest, highest], not {value!r}")
 

@@ -14,7 +14,7 @@ told so. An arm that still moves may yet leave a zone by itself; whether it does
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -119,7 +119,7 @@ class Claims:
         return list(dict.fromkeys(claim.party for claim in self._held if zone in claim.zones))
 
     @contextmanager
-    def preparing(self, claim: Claim) -> Iterator[None]:
+    def preparing(self, claim: Claim) -> Generator[None]:
         """While this is entered, a claim is not judged yet, but ended as one that waits."""
         self._prepared.append(claim)
         try:
@@ -136,7 +136,7 @@ class Claims:
             claim.answer(ZoneOccupied(f"{claim.party.name} may not pass: {self._reason(claim)}"))
 
     @contextmanager
-    def pausing(self, pause: Pause) -> Iterator[None]:
+    def pausing(self, pause: Pause) -> Generator[None]:
         """While this is entered, a program waits for others; raises ZoneDeadlock if it would do so for ever."""
         cycle = self._cycle(pause)
         if cycle:

@@ -48,4 +48,4 @@ class Course(Generic[S]):
     @property
     def zones(self) -> frozenset[str]:
         """What they lead through."""
-        return frozenset().union(*(step.zones for step in self.steps))
+        return frozenset[str]().union(*(step.zones for step in self.steps))

@@ -7,7 +7,7 @@ the caller's code, and his exceptions reach him as they are.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Collection, Mapping
+from collections.abc import AsyncGenerator, Collection, Mapping
 from contextlib import asynccontextmanager
 from typing import Any, Generic, Literal, Self, TypeVar
 
@@ -52,7 +52,7 @@ class Crew(Generic[A]):
         self._epoch = Epoch()
 
     @asynccontextmanager
-    async def _connected(self, options: Mapping[str, Any]) -> AsyncIterator[Self]:
+    async def _connected(self, options: Mapping[str, Any]) -> AsyncGenerator[Self]:
         """Holds all arms, each in a task of its own, for the length of a block."""
         leave = asyncio.Event()
         ready = {name: asyncio.get_running_loop().create_future() for name in self._seats}
@@ -140,7 +140,7 @@ class Crew(Generic[A]):
             del self.failures[seat.name]
 
     @asynccontextmanager
-    async def _stopping_others(self) -> AsyncIterator[None]:
+    async def _stopping_others(self) -> AsyncGenerator[None]:
         """When this is left, the arms that a failure has stopped have heard of it, or had their time to."""
         try:
             yield

@@ -10,31 +10,31 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import asynccontextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.hooks import Hooks
 from dobot_async.arms.base import Arm
+from dobot_async.arms.magician import commands as magician
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.magician.jogs import Jog
+from dobot_async.arms.magician.queue import Batch, MagicianQueue
+from dobot_async.arms.magician.stopping import STILL
+from dobot_async.arms.mycobot import commands as mycobot
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.mycobot.queue import CobotBatch, CobotQueue
+from dobot_async.arms.registry import Each
+from dobot_async.arms.ultraarm import commands as ultraarm
+from dobot_async.arms.ultraarm.arm import UltraArm, UltraArmJog
+from dobot_async.arms.ultraarm.queue import UltraArmBatch, UltraArmQueue
 from dobot_async.errors import MotionUnknown, ReplyTimeout
-from dobot_async.families import Each
 from dobot_async.fleet.magician_planner import MagicianPlanner
 from dobot_async.fleet.planner import Planner, Unplanned
 from dobot_async.fleet.queue import FleetQueue
-from dobot_async.magician import commands as magician
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.jogs import Jog
-from dobot_async.magician.queue import Batch, MagicianQueue
-from dobot_async.magician.stopping import STILL
-from dobot_async.mycobot import commands as mycobot
-from dobot_async.mycobot.arm import MyCobot
-from dobot_async.mycobot.queue import CobotBatch, CobotQueue
-from dobot_async.ultraarm import commands as ultraarm
-from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
-from dobot_async.ultraarm.queue import UltraArmBatch, UltraArmQueue
-from dobot_async.wire import Command
 
 __all__ = ["FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "AnyArm", "Family", "family_of"]
 
@@ -100,7 +100,7 @@ class FleetMagician(Magician):
             await super().set_rail(on=on, **options)
 
     @asynccontextmanager
-    async def jogging(self, direction: Jog | str) -> AsyncIterator[None]:
+    async def jogging(self, direction: Jog | str) -> AsyncGenerator[None]:
         """Jogs until the block ends, once the fleet allows it; see `Magician.jogging`.
 
         Raises:
@@ -123,7 +123,7 @@ class FleetMyCobot(MyCobot):
         self.queue: FleetCobotQueue = FleetCobotQueue(self._executor, self.model)
 
     @asynccontextmanager
-    async def jogging(self, direction: str, **options: Any) -> AsyncIterator[None]:
+    async def jogging(self, direction: str, **options: Any) -> AsyncGenerator[None]:
         """Jogs until the block ends, once the fleet allows it; see `MyCobot.jogging`."""
         async with self.queue.roaming(), super().jogging(direction, **options):
             yield
@@ -143,7 +143,7 @@ class FleetUltraArm(UltraArm):
         return self._runner.state.homed
 
     @asynccontextmanager
-    async def jogging(self, direction: UltraArmJog | str, **options: Any) -> AsyncIterator[None]:
+    async def jogging(self, direction: UltraArmJog | str, **options: Any) -> AsyncGenerator[None]:
         """Jogs until the block ends, once the fleet allows it; see `UltraArm.jogging`."""
         async with self.queue.roaming(), super().jogging(direction, **options):
             yield

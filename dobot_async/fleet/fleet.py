@@ -12,7 +12,7 @@ Coordinates are each arm's own; its base frame turns those of the cell into them
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar, cast, overload
@@ -20,6 +20,12 @@ from typing import Any, Concatenate, ParamSpec, TypeVar, cast, overload
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async._core.util.shapes import Shape
 from dobot_async._core.util.tasks import STAYING
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.magician.queue import Batch
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.mycobot.queue import CobotBatch
+from dobot_async.arms.ultraarm.arm import UltraArm
+from dobot_async.arms.ultraarm.queue import UltraArmBatch
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
 from dobot_async.fleet.cell import read_cell
 from dobot_async.fleet.claims import Party
@@ -30,12 +36,6 @@ from dobot_async.fleet.seat import Member, Seat, tell_to_stop
 from dobot_async.fleet.together import Launch, Together, abandon
 from dobot_async.fleet.work import all_of, named, side_by_side
 from dobot_async.fleet.zones import Program, Run, here, running
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.queue import Batch
-from dobot_async.mycobot.arm import MyCobot
-from dobot_async.mycobot.queue import CobotBatch
-from dobot_async.ultraarm.arm import UltraArm
-from dobot_async.ultraarm.queue import UltraArmBatch
 
 __all__ = ["Fleet", "OnFailure"]
 
@@ -347,7 +347,7 @@ class Fleet(Crew[A]):
     def together(self, *names: str, timeout: float | None = None) -> AbstractAsyncContextManager[Together[Any]]: ...
 
     @asynccontextmanager
-    async def together(self, *names: str, timeout: float | None = None) -> AsyncIterator[Together[Any]]:
+    async def together(self, *names: str, timeout: float | None = None) -> AsyncGenerator[Together[Any]]:
         """Collects a batch for each of several arms, and starts them at one instant when the block ends.
 
         The arms first finish what they have to do. Motions return as usual; `start` and `skew` of what this yields tell

@@ -19,11 +19,12 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from typing import Generic, Literal, Protocol, TypeVar
 
 from dobot_async._core.queue.motion import Motion
+from dobot_async.arms.magician.paths import STEP
 from dobot_async.errors import DobotError
 from dobot_async.fleet.claims import Claim, Party
 from dobot_async.fleet.course import Course, Step
@@ -31,7 +32,6 @@ from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.limits import Limits
 from dobot_async.fleet.planner import Planner, Region, Stance
 from dobot_async.fleet.zones import Zones, here
-from dobot_async.magician.paths import STEP
 
 __all__ = ["Guard", "Mode"]
 
@@ -100,7 +100,7 @@ class Guard(Generic[S]):
     @property
     def holds(self) -> frozenset[str]:
         """The zones that the arm is in, or has ahead."""
-        return frozenset().union(*(claim.zones for claim in self._claims))
+        return frozenset[str]().union(*(claim.zones for claim in self._claims))
 
     async def plan(self, motions: Sequence[Motion]) -> Course[S]:
         """Look at commands that are to be sent together; nothing is held yet.
@@ -181,7 +181,7 @@ class Guard(Generic[S]):
         await self._planner.check()
 
     @asynccontextmanager
-    async def roaming(self) -> AsyncIterator[None]:
+    async def roaming(self) -> AsyncGenerator[None]:
         """While this is entered, the arm may go anywhere."""
         if self.is_limited:
             await self._be_sure()
@@ -192,7 +192,7 @@ class Guard(Generic[S]):
             yield
 
     @asynccontextmanager
-    async def changing(self, value: object) -> AsyncIterator[None]:
+    async def changing(self, value: object) -> AsyncGenerator[None]:
         """While this is entered, something that ways depend on changes at once, such as the end effector.
 
         What was looked at before, and has not ended, may lead anywhere then.
@@ -347,7 +347,7 @@ class Guard(Generic[S]):
             )
 
     @asynccontextmanager
-    async def _loosened(self, claim: Claim | None) -> AsyncIterator[None]:
+    async def _loosened(self, claim: Claim | None) -> AsyncGenerator[None]:
         """While this is entered, the arm may be wherever a claim lets it, and its stance is not known."""
         if claim:
             self._claims.append(claim)

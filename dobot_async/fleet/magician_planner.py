@@ -18,12 +18,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol, TypeVar
 
+from dobot_async._core.protocol.wire import Command
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.kinematics import Joints, Kinematics
+from dobot_async.arms.magician.paths import STEP, Lift, Way, reach_of, way_of
+from dobot_async.arms.magician.reach import destination
 from dobot_async.fleet.planner import XYZ, Discs, Plan, Points, Region
-from dobot_async.magician import commands as c
-from dobot_async.magician.kinematics import Joints, Kinematics
-from dobot_async.magician.paths import STEP, Lift, Way, reach_of, way_of
-from dobot_async.magician.reach import destination
-from dobot_async.wire import Command
 
 __all__ = ["MagicianPlanner", "MagicianStance"]
 
@@ -41,12 +41,14 @@ class Asked(Protocol):
     @property
     def restarts(self) -> int:
         """How often it was seen to have been switched off and on."""
+        ...
 
     async def check_restart(self) -> None:
         """Raise MotionUnknown if it was switched off and on since this was asked last; its motions end."""
 
     async def request(self, command: Command[Q, R], value: Q) -> R:
         """Send any row of the command table immediately, and return the arm's answer."""
+        ...
 
 
 class Homing(NamedTuple):

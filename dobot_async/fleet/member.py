@@ -36,7 +36,7 @@ class Member(Generic[A]):
 
     url: str
     kind: type[A]
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict[str, Any])
     base: BaseFrame = field(default_factory=BaseFrame)
     group: str | None = None
     guard: Mode = "off"

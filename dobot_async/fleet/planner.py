@@ -29,9 +29,11 @@ class Region(Protocol):
     @property
     def known(self) -> bool:
         """Whether the tool is known to be in each zone of it; else in any of them, or in none."""
+        ...
 
     def zones(self, zones: Zones, base: BaseFrame, margin: float) -> frozenset[str]:
         """Return the zones that it touches, or comes nearer to than `margin` mm."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +83,7 @@ class Discs:
     def zones(self, zones: Zones, base: BaseFrame, margin: float) -> frozenset[str]:
         """Return the zones that they touch."""
         places = [base.to_cell(x, y, 0.0) for x, y in self.centres]
-        return frozenset().union(*(zones.near(place.x, place.y, self.radius + margin) for place in places))
+        return frozenset[str]().union(*(zones.near(place.x, place.y, self.radius + margin) for place in places))
 
 
 class Stance(Protocol):
@@ -90,13 +92,16 @@ class Stance(Protocol):
     @property
     def tool(self) -> XYZ:
         """The place of the tool."""
+        ...
 
     @property
     def region(self) -> Region:
         """Where the tool may be, as far as that is known."""
+        ...
 
     def near(self, other: Self) -> bool:
         """Return whether another one is the same, but for what numbers lose on the line."""
+        ...
 
 
 S = TypeVar("S", bound=Stance)
@@ -123,6 +128,7 @@ class Planner(Protocol[S]):
     @property
     def astray(self) -> bool:
         """Whether the arm has lost its place: it is elsewhere than it tells, until it was homed."""
+        ...
 
     async def check(self) -> None:
         """Make sure that it is still the same run of the arm.
@@ -137,9 +143,11 @@ class Planner(Protocol[S]):
         Raises:
             MotionUnknown: It turns out to have been switched off and on; its queue was told.
         """
+        ...
 
     async def tool(self) -> XYZ:
         """Read where its tool is, and nothing else."""
+        ...
 
     async def plan(self, value: object, start: S | None) -> Plan[S]:
         """Return where a motion leads from a stance.
@@ -151,15 +159,19 @@ class Planner(Protocol[S]):
         Raises:
             ValueError: It leads where the arm cannot go, or cannot be guarded.
         """
+        ...
 
     def change(self, value: object, start: S | None) -> Plan[S] | None:
         """Return what a command does that moves nothing: where the tool is then; None if it changes no way."""
+        ...
 
     def homes(self, value: object) -> bool:
         """Return whether an arm that has done this command knows its place."""
+        ...
 
     def begun(self, value: object) -> object:
         """Take note that a command is on its way to the arm; return what `homed` needs, None if it does not home."""
+        ...
 
     def homed(self, homing: object) -> None:
         """Take note that a homing is done, of which `begun` has returned this."""
@@ -169,6 +181,7 @@ class Planner(Protocol[S]):
 
     def reach(self, stance: S | None) -> Region:
         """Return where the arm may come on ways that are not known."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ class Overseer(Protocol):
         self, motions: Sequence[Motion], timeout: float | None, epoch: Epoch
     ) -> AbstractAsyncContextManager[float | None]:
         """While this is entered, motions may be sent; raises if they may not be. Yields the seconds that are left."""
+        ...
 
     def roaming(self, halt: Callable[[], Awaitable[None]] | None) -> AbstractAsyncContextManager[None]:
         """While this is entered, the arm may go anywhere; raises if it may not.
@@ -34,9 +35,11 @@ class Overseer(Protocol):
         Args:
             halt: Ends what it does there, for an arm that has limits.
         """
+        ...
 
     def changing(self, value: object) -> AbstractAsyncContextManager[None]:
         """While this is entered, something changes at once on which the arm's ways depend."""
+        ...
 
     def ended(self, error: DobotError) -> None:
         """Takes note of what ends all motions of the arm."""

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from typing import Any, cast
 
 import anyio
 
+from dobot_async._core.protocol.contract import LinkState
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.arms.base import Arm
-from dobot_async.contract import LinkState
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.fleet.claims import Claim, Party, Pause
 from dobot_async.fleet.course import Course, Step
@@ -142,7 +142,7 @@ class Seat:
     @asynccontextmanager
     async def admitted(
         self, motions: Sequence[Motion], timeout: float | None, epoch: Epoch
-    ) -> AsyncIterator[float | None]:
+    ) -> AsyncGenerator[float | None]:
         """While this is entered, motions may be sent. Yields the seconds that are left for it."""
         loop = asyncio.get_running_loop()
         deadline = None if timeout is None else loop.time() + timeout
@@ -161,7 +161,7 @@ class Seat:
             self.end_turn()
 
     @asynccontextmanager
-    async def roaming(self, halt: Callable[[], Awaitable[None]] | None) -> AsyncIterator[None]:
+    async def roaming(self, halt: Callable[[], Awaitable[None]] | None) -> AsyncGenerator[None]:
         """While this is entered, the arm may go anywhere, but for its limits, where it is stopped."""
         guard = self._guard
         async with self._turn():
@@ -186,7 +186,7 @@ class Seat:
                 raise MotionStopped(f"{self.name} was stopped in its jog: {watch.result()}")
 
     @asynccontextmanager
-    async def changing(self, value: object) -> AsyncIterator[None]:
+    async def changing(self, value: object) -> AsyncGenerator[None]:
         """While this is entered, something changes at once on which the arm's ways depend."""
         if self._guard is None:
             yield
@@ -196,7 +196,7 @@ class Seat:
             yield
 
     @asynccontextmanager
-    async def _turn(self) -> AsyncIterator[None]:
+    async def _turn(self) -> AsyncGenerator[None]:
         """While this is entered, nobody else commands the arm; raises MotionStopped if it was stopped meanwhile."""
         self.check()
         epoch = self.queue.epoch

@@ -35,6 +35,7 @@ class Collected(Protocol):
     @property
     def motions(self) -> list[Motion]:
         """What it has collected."""
+        ...
 
 
 B = TypeVar("B", bound=Collected)
@@ -175,7 +176,8 @@ class Launch:
             pausing = {name: seat for name, seat in seats.items() if seat.family.pauses}
             await side_by_side({name: seat.queue.pause() for name, seat in pausing.items()})
             rooms = await side_by_side({name: room(seat) for name, seat in pausing.items()})
-            first, rest = {}, {}
+            first: dict[str, Sequence[Motion]] = {}
+            rest: dict[str, Sequence[Motion]] = {}
             for name in seats:
                 motions = self.batches[name].motions
                 loaded = max(1, rooms.get(name, 1) - 1)
@@ -225,7 +227,7 @@ async def room(seat: Seat) -> int:
 async def measure(seat: Seat) -> float:
     """Returns how many seconds a message takes to an arm: half of a typical round trip."""
     loop = asyncio.get_running_loop()
-    trips = []
+    trips: list[float] = []
     for _ in range(SAMPLES):
         asked = loop.time()
         await seat.arm.request(seat.family.ask, None)

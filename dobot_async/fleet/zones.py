@@ -8,7 +8,7 @@ other.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterator, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Collection, Generator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ class Run:
     """
 
     parties: Mapping[str, Party]
-    alive: set[str] = field(default_factory=set)
+    alive: set[str] = field(default_factory=set[str])
 
 
 @dataclass(eq=False)
@@ -93,7 +93,7 @@ def here() -> Program:
 
 
 @contextmanager
-def running(program: Program) -> Iterator[None]:
+def running(program: Program) -> Generator[None]:
     """While this is entered, `program` is the one that runs here."""
     before = current.get()
     current.set(program)
@@ -118,9 +118,9 @@ class Zones:
     shapes: Mapping[str, Shape | None]
     arms: Mapping[str, Party]
     claims: Claims = field(default_factory=Claims)
-    guards: list[Callable[[], Awaitable[None]]] = field(default_factory=list)
-    drivers: dict[str, asyncio.Task[object] | None] = field(default_factory=dict)
-    _watched: WeakSet[asyncio.Task[object]] = field(default_factory=WeakSet)
+    guards: list[Callable[[], Awaitable[None]]] = field(default_factory=list[Callable[[], Awaitable[None]]])
+    drivers: dict[str, asyncio.Task[object] | None] = field(default_factory=dict[str, asyncio.Task[object] | None])
+    _watched: WeakSet[asyncio.Task[object]] = field(default_factory=WeakSet[asyncio.Task[object]])
 
     def near(self, x: float, y: float, reach: float) -> frozenset[str]:
         """Returns the zones that are at most so far from a vertical line of the cell."""
@@ -176,7 +176,7 @@ class Zones:
         return frozenset(each.party for each in line) | {self.arms[arm] for arm in named}
 
     @asynccontextmanager
-    async def hold(self, zone: str, arms: Collection[str], timeout: float | None, epoch: Epoch) -> AsyncIterator[None]:
+    async def hold(self, zone: str, arms: Collection[str], timeout: float | None, epoch: Epoch) -> AsyncGenerator[None]:
         """Holds a zone for the length of a block that begins in an epoch of the fleet."""
         if zone not in self.shapes:
             raise ValueError(f"no zone {zone!r}; there are: {', '.join(self.shapes) or 'none'}")

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncGenerator, Generator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any, SupportsFloat
 
 from dobot_async._core.link.link import Link
+from dobot_async._core.protocol.layouts import NOTHING
+from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.queue.executor import Entry, in_motions, unseen
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
@@ -23,8 +25,6 @@ from dobot_async._core.util.tasks import STAYING, cancel_and_join
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, MotionUnknown, UnsupportedError, another
 from dobot_async.following.follow import SETTLE, Follow, Pace
 from dobot_async.following.strategy import Strategy
-from dobot_async.layouts import NOTHING
-from dobot_async.wire import Command, Queueing
 
 __all__ = ["MAX_SPEED", "MAX_TURN", "RATE", "STALE", "follow_target"]
 
@@ -52,7 +52,7 @@ class Unwatched:
         """Do nothing."""
 
     @contextmanager
-    def watching(self) -> Iterator[None]:
+    def watching(self) -> Generator[None]:
         """Do nothing."""
         yield
 
@@ -70,7 +70,7 @@ async def follow_target(
     max_speed: SupportsFloat,
     max_turn: SupportsFloat,
     stale: SupportsFloat,
-) -> AsyncIterator[Follow]:
+) -> AsyncGenerator[Follow]:
     """Let an arm follow a target for the length of the block; see `arm.following`.
 
     Args:

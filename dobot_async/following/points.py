@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, SupportsFloat, cast
 
 from dobot_async._core.util.arguments import to_float
 
@@ -54,7 +54,7 @@ def read_point(target: Any, axes: Sequence[str], joints: int, here: Point | None
     if isinstance(target, (str, bytes)) or not isinstance(target, Iterable):
         raise TypeError(f"target must be a pose, or numbers ({', '.join(names)}), not {target!r}")
 
-    given = list(target)
+    given = list(cast("Iterable[SupportsFloat]", target))
     numbers = [to_float(value, name) for name, value in zip(names, given, strict=False)]
     least = len(names) if as_joints else 3
     if not least <= len(given) <= len(names):

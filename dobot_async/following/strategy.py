@@ -30,26 +30,32 @@ class Strategy(Protocol):
     @property
     def axes(self) -> Sequence[str]:
         """The names of its coordinates, x, y and z first."""
+        ...
 
     @property
     def joints(self) -> int:
         """How many joints it has."""
+        ...
 
     @property
     def turns(self) -> bool:
         """Whether its angles are the same after a whole turn."""
+        ...
 
     @property
     def replaces(self) -> bool:
         """Whether `go` takes the place of the motion that goes on; else it is called at an arm that rests."""
+        ...
 
     @property
     def tolerance(self) -> tuple[float, float]:
         """How near counts as there, mm and degrees."""
+        ...
 
     @property
     def check_every(self) -> float:
         """Seconds between two calls of `check`."""
+        ...
 
     def allow(self, point: Point) -> None:
         """Raise ValueError for a place that is beyond the limits, or out of reach."""
@@ -59,9 +65,11 @@ class Strategy(Protocol):
 
     async def look(self, *, joints: bool) -> Look:
         """Return where the arm is, as coordinates or as joints; raise ReplyTimeout if it is silent."""
+        ...
 
     def within(self, look: Look, point: Point) -> Point:
         """Return how far towards a place the arm may be sent from where it is."""
+        ...
 
     async def go(self, point: Point) -> bool:
         """Send the arm to a place, once; return False if that is known to have been lost.
@@ -69,6 +77,7 @@ class Strategy(Protocol):
         Raises:
             ReplyTimeout: The arm is silent.
         """
+        ...
 
     async def check(self) -> None:
         """Raise ArmAlarm if something keeps the arm from moving."""

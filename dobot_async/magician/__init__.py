@@ -1,1 +1,1 @@
-"""The Dobot Magician: commands, alarms, kinematics, and the arm itself."""
+"""The commands of the Dobot Magician for users: `from dobot_async.magician import commands`."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
-from collections.abc import AsyncIterator, Collection, Iterator
+from collections.abc import AsyncGenerator, Collection, Generator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -136,7 +136,7 @@ class Server(uvicorn.Server):
     """A server that leaves the signals to the program."""
 
     @contextmanager
-    def capture_signals(self) -> Iterator[None]:
+    def capture_signals(self) -> Generator[None]:
         """Capture none."""
         yield
 
@@ -151,7 +151,7 @@ async def serve_http(
     origins: Collection[str] = (),
     certificate: str | Path | None = None,
     key: str | Path | None = None,
-) -> AsyncIterator[str]:
+) -> AsyncGenerator[str]:
     """Serve clients by streamable HTTP for the length of a block; yields the URL.
 
     Args:
@@ -174,7 +174,7 @@ async def serve_http(
     if key and not certificate:
         raise ValueError("a key needs its certificate")
 
-    guard = Guard(app_of(server), Authenticator(token, frozenset(origins), lambda _: None, lambda *_: None), names)
+    guard = Guard(app_of(server), Authenticator(token, frozenset(origins), begins=ignored, refuse=ignored), names)
     listening = listen(host, port)
     running, before = Server(config_of(guard, certificate, key)), watchers()
     serving = asyncio.create_task(running.serve([listening]), name="dobot_async mcp http")
@@ -185,6 +185,10 @@ async def serve_http(
     finally:
         server.works.close()
         await run_shielded(ended(running, serving, listening, before))
+
+
+def ignored(*_: object) -> None:
+    """Do nothing: HTTP is told apart, and refused, by the guard."""
 
 
 def app_of(server: ArmServer) -> ASGIApp:

@@ -34,8 +34,8 @@ class Planned:
         picture: PNG; b"" if nothing is to be seen.
     """
 
-    problems: list[dict[str, Any]] = field(default_factory=list)
-    ways: list[Way] = field(default_factory=list)
+    problems: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    ways: list[Way] = field(default_factory=list[Way])
     seconds: float | None = None
     picture: bytes = b""
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
 from typing import Any
 from urllib.parse import quote
@@ -142,7 +142,7 @@ def scene(works: Works) -> dict[str, Any]:
 
 
 @contextmanager
-def logging_as_it_is() -> Iterator[None]:
+def logging_as_it_is() -> Generator[None]:
     """Leave the root logger as the program has it: making a server would give it a handler."""
     root = logging.getLogger()
     handlers, level = list(root.handlers), root.level

@@ -12,7 +12,7 @@ import asyncio
 import logging
 import os
 import threading
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager, suppress
 from queue import SimpleQueue
 
@@ -117,7 +117,7 @@ class Writer:
 
 
 @asynccontextmanager
-async def standard_streams(stdin: int, stdout: int) -> AsyncIterator[Messages]:
+async def standard_streams(stdin: int, stdout: int) -> AsyncGenerator[Messages]:
     """The messages of the client at two file descriptors."""
     to_server, incoming = anyio.create_memory_object_stream[SessionMessage | Exception](0)
     outgoing, from_server = anyio.create_memory_object_stream[SessionMessage](0)

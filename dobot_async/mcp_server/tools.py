@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal
 
@@ -230,7 +230,7 @@ def gone_of(ctx: Ctx) -> asyncio.Event | None:
 
 
 @contextmanager
-def told_to_the_model() -> Iterator[None]:
+def told_to_the_model() -> Generator[None]:
     """What went wrong is for the model to read."""
     try:
         yield

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dobot_async._core.link.link import Link
+from dobot_async._core.protocol.contract import LinkState, LinkStats
 from dobot_async.arms.base import Arm
 from dobot_async.bridge import Bridge
-from dobot_async.contract import LinkState, LinkStats
 from dobot_async.errors import DobotError
 
 __all__ = ["ArmFigures", "figures_of", "figures_of_bridge", "read_figures"]
@@ -41,12 +41,17 @@ class ArmFigures:
     outages: int
     round_trip: float | None = None
     pending: int | None = None
-    motions: Mapping[str, int] = field(default_factory=dict)
+    motions: Mapping[str, int] = field(default_factory=dict[str, int])
     alarms: int | None = None
     moving: bool | None = None
     clients: int | None = None
     stops: int | None = None
     held: bool | None = None
+
+    @property
+    def up(self) -> bool:
+        """Whether the link is open."""
+        return self.state is LinkState.OPEN
 
 
 def of_link(link: Link[Any], **more: Any) -> ArmFigures:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import hmac
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from email.parser import BytesParser
 from http import HTTPStatus
@@ -110,7 +110,7 @@ def response(status: HTTPStatus, body: bytes) -> bytes:
 @asynccontextmanager
 async def serve_metrics(
     place: HostAndPort, text: Callable[[], Awaitable[bytes]], *, token: str | None = None
-) -> AsyncIterator[str]:
+) -> AsyncGenerator[str]:
     """Serve `/metrics` for the length of a block; yields its URL.
 
     Args:

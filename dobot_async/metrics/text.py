@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
-from dobot_async.contract import LinkState
 from dobot_async.metrics.figures import ArmFigures
 
 if TYPE_CHECKING:
@@ -25,33 +25,33 @@ class Row(NamedTuple):
         name: Without the `_total` of counters.
         kind: "gauge" or "counter".
         text: What it says.
-        value: Its value; None leaves it out.
+        value: Where its value is in the figures; None leaves it out.
     """
 
     name: str
     kind: str
     text: str
-    value: Callable[[ArmFigures], float | None]
+    value: str
 
 
 ROWS = (
-    Row("dobot_link_up", GAUGE, "Whether the link to the arm is open.", lambda f: f.state is LinkState.OPEN),
-    Row("dobot_link_outages", COUNTER, "How often the link was lost and reopened.", lambda f: f.outages),
-    Row("dobot_link_requests", COUNTER, "Requests sent, repeated ones included.", lambda f: f.stats.sent),
-    Row("dobot_link_replies", COUNTER, "Whole frames received.", lambda f: f.stats.received),
-    Row("dobot_link_repeats", COUNTER, "Requests sent again.", lambda f: f.stats.repeated),
-    Row("dobot_link_losses", COUNTER, "Requests that were not answered in their turn.", lambda f: f.stats.lost),
-    Row("dobot_link_timeouts", COUNTER, "Calls that failed without an answer.", lambda f: f.stats.timeouts),
-    Row("dobot_link_unexpected", COUNTER, "Frames that answered nothing.", lambda f: f.stats.unexpected),
-    Row("dobot_link_bad_frames", COUNTER, "Frames with a wrong checksum.", lambda f: f.stats.bad_frames),
-    Row("dobot_link_junk_bytes", COUNTER, "Bytes that belong to no frame.", lambda f: f.stats.junk_bytes),
-    Row("dobot_link_round_trip_seconds", GAUGE, "What an answer takes on the average.", lambda f: f.round_trip),
-    Row("dobot_queue_pending", GAUGE, "Accepted commands that have not ended.", lambda f: f.pending),
-    Row("dobot_alarms", GAUGE, "Alarms that are set.", lambda f: f.alarms),
-    Row("dobot_moving", GAUGE, "Whether the arm is in the middle of something.", lambda f: f.moving),
-    Row("dobot_lease_held", GAUGE, "Whether somebody has the lease.", lambda f: f.held),
-    Row("dobot_bridge_clients", GAUGE, "Clients of the bridge.", lambda f: f.clients),
-    Row("dobot_bridge_stops", COUNTER, "How often something stopped the arm.", lambda f: f.stops),
+    Row("dobot_link_up", GAUGE, "Whether the link to the arm is open.", "up"),
+    Row("dobot_link_outages", COUNTER, "How often the link was lost and reopened.", "outages"),
+    Row("dobot_link_requests", COUNTER, "Requests sent, repeated ones included.", "stats.sent"),
+    Row("dobot_link_replies", COUNTER, "Whole frames received.", "stats.received"),
+    Row("dobot_link_repeats", COUNTER, "Requests sent again.", "stats.repeated"),
+    Row("dobot_link_losses", COUNTER, "Requests that were not answered in their turn.", "stats.lost"),
+    Row("dobot_link_timeouts", COUNTER, "Calls that failed without an answer.", "stats.timeouts"),
+    Row("dobot_link_unexpected", COUNTER, "Frames that answered nothing.", "stats.unexpected"),
+    Row("dobot_link_bad_frames", COUNTER, "Frames with a wrong checksum.", "stats.bad_frames"),
+    Row("dobot_link_junk_bytes", COUNTER, "Bytes that belong to no frame.", "stats.junk_bytes"),
+    Row("dobot_link_round_trip_seconds", GAUGE, "What an answer takes on the average.", "round_trip"),
+    Row("dobot_queue_pending", GAUGE, "Accepted commands that have not ended.", "pending"),
+    Row("dobot_alarms", GAUGE, "Alarms that are set.", "alarms"),
+    Row("dobot_moving", GAUGE, "Whether the arm is in the middle of something.", "moving"),
+    Row("dobot_lease_held", GAUGE, "Whether somebody has the lease.", "held"),
+    Row("dobot_bridge_clients", GAUGE, "Clients of the bridge.", "clients"),
+    Row("dobot_bridge_stops", COUNTER, "How often something stopped the arm.", "stops"),
 )
 
 
@@ -69,7 +69,7 @@ class Figures:
         for row in ROWS:
             family = kinds[row.kind](row.name, row.text, labels=["arm"])
             for name, figures in self._arms.items():
-                value = row.value(figures)
+                value: float | None = attrgetter(row.value)(figures)
                 if value is not None:
                     family.add_metric([name], float(value))
 

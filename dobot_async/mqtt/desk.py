@@ -19,7 +19,7 @@ import logging
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Coroutine, Mapping
-from typing import Any
+from typing import Any, cast
 
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async._core.util.text import printable
@@ -83,7 +83,7 @@ class Desk:
         self._on = on
         self._reply = reply
         self._changed = changed
-        self._lease: Lease[Party] = Lease(takeover=False, leave=end_works, cut=lambda *_: None, tell=self._tell)
+        self._lease: Lease[Party] = Lease(takeover=False, leave=end_works, cut=keep, tell=self._tell)
         self._told: OrderedDict[tuple[str, str], dict[str, Any] | None] = OrderedDict()
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -230,6 +230,10 @@ class Desk:
         self._changed()
 
 
+def keep(_party: Party, _reason: str) -> None:
+    """Nobody takes a lease from who has it, so nobody is cut off."""
+
+
 async def end_works(party: Party) -> None:
     """End what a session has the arm do; when this returns the arm was stopped."""
     for task in list(party.works):
@@ -242,13 +246,14 @@ def parsed(payload: bytes) -> tuple[str, dict[str, Any]]:
         raise ValueError(f"a message has {LONGEST} bytes at the most")
 
     try:
-        given = json.loads(payload)
+        read = json.loads(payload)
     except (ValueError, RecursionError):
         raise ValueError("a command is a JSON object") from None
 
-    if not isinstance(given, dict):
+    if not isinstance(read, dict):
         raise ValueError("a command is a JSON object")  # noqa: TRY004 - of a message, not of a caller
 
+    given = cast(dict[str, Any], read)
     session = given.pop("session", None)
     if not isinstance(session, str) or not SESSION.fullmatch(session):
         raise ValueError("session: 1 to 64 letters, digits, - and _")

@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import AsyncIterator, Collection, Mapping
+from collections.abc import AsyncGenerator, Collection, Mapping
 from contextlib import asynccontextmanager, suppress
 from typing import Any
 
@@ -153,7 +153,7 @@ class Gateway:
             delay = min(2 * delay, SLOWEST)
 
     @asynccontextmanager
-    async def _client(self) -> AsyncIterator[aiomqtt.Client]:
+    async def _client(self) -> AsyncGenerator[aiomqtt.Client]:
         broker = self._broker
         client = aiomqtt.Client(
             broker.host,

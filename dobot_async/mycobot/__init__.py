@@ -1,1 +1,1 @@
-"""The myCobot family: myArm 300, myCobot 280 and 320, mechArm 270, myPalletizer 260."""
+"""The commands of the myCobot family for users: `from dobot_async.mycobot import commands`."""

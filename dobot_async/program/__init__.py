@@ -9,7 +9,7 @@ vocabulary of its family, `vocabulary.py` beside its verbs; no arm is known here
 
 from __future__ import annotations
 
-from dobot_async.families import Parts
+from dobot_async.arms.registry import Parts
 from dobot_async.program.step import ProgramError, Step
 from dobot_async.program.vocabulary import Vocabulary
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async.program.text import shortened
-from dobot_async.wire import Command
 
 __all__ = ["ProgramError", "Step"]
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async.program.step import ProgramError, Step
 from dobot_async.program.text import parse_number, shortened
-from dobot_async.wire import Command
 
 __all__ = ["NUMBER", "ON_OFF", "WHOLE", "Kind", "Reader", "Verb", "Vocabulary", "bare", "choice", "takes"]
 
@@ -76,7 +76,7 @@ class Verb:
     call: Callable[..., Result]
     arguments: tuple[tuple[str, Kind], ...] = ()
     needed: int = 0
-    options: Mapping[str, Kind] = field(default_factory=dict)
+    options: Mapping[str, Kind] = field(default_factory=dict[str, Kind])
 
     def usage(self, name: str) -> str:
         """How it is written."""
@@ -112,7 +112,8 @@ class Vocabulary:
             ProgramError: Lines are wrong.
         """
         reader = self.reader(options)
-        steps, problems = [], []
+        steps: list[Step] = []
+        problems: list[tuple[int, str]] = []
         for number, written in enumerate(lines, 1):
             text = bare(written)
             if text:

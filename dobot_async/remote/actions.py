@@ -38,15 +38,19 @@ class Action(Protocol):
     @property
     def do(self) -> str:
         """Its name."""
+        ...
 
     def check(self, on: RemoteArm) -> None:
         """Raise ValueError, with the reason, if this arm cannot do it, or may not."""
+        ...
 
     def ways(self, on: RemoteArm, start: tuple[float, float, float]) -> list[Way]:
         """Return the ways on which the tool works, seen from where it begins; for a picture."""
+        ...
 
     async def run(self, on: RemoteArm, note: Note) -> dict[str, Any]:
         """Do it, and return what is to be said of it when the arm has done it."""
+        ...
 
 
 class Strict:

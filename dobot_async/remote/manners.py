@@ -11,9 +11,9 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from dobot_async.magician.arm import Magician
-from dobot_async.mycobot.arm import MyCobot
-from dobot_async.ultraarm.arm import UltraArm
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.ultraarm.arm import UltraArm
 
 __all__ = ["MANNERS", "Manners", "manners_of"]
 
@@ -44,7 +44,7 @@ class Manners:
     moves: Callable[[float], Mapping[str, Any]]
     home: Callable[[float], Mapping[str, Any]]
     pen: Callable[[float], Mapping[str, Any]]
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict[str, Any])
     turns: bool = False
     tools: tuple[str, ...] = ("suction", "gripper")
 

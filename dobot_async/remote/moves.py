@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from dobot_async.handling import pick, place
-from dobot_async.hands import move_straight, settle_time
+from dobot_async.handling.arms import move_straight, settle_time
 from dobot_async.remote.actions import Note, Strict, Way, action
 from dobot_async.remote.site import RemoteArm
 from dobot_async.remote.told import pose_told

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -100,7 +100,7 @@ class Site:
 
     arms: Mapping[str, RemoteArm]
     moves: bool
-    zones: Mapping[str, Any] = field(default_factory=dict)
+    zones: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __iter__(self) -> Iterator[RemoteArm]:
         return iter(self.arms.values())
@@ -124,7 +124,7 @@ async def open_site(
     allow_motion: bool = False,
     speed: float = SPEED,
     workspace: Workspace | None = None,
-) -> AsyncIterator[Site]:
+) -> AsyncGenerator[Site]:
     """Connect to an arm, or to those of a cell, for the length of a block.
 
     Without `allow_motion` the connections only read: nothing that is sent by them can move an arm.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from dobot_async._core.util.workspace import Workspace
 from dobot_async.arms.base import ArmPose
@@ -29,7 +29,7 @@ def pose_told(pose: ArmPose) -> dict[str, Any]:
 
 def alarms_told(alarms: tuple[object, ...]) -> list[dict[str, Any]]:
     """Return alarms with their causes and remedies."""
-    told = []
+    told: list[dict[str, Any]] = []
     for each in alarms:
         more = asdict(each) if is_dataclass(each) and not isinstance(each, type) else {}
         told.append(plain({**more, "text": str(each)}))
@@ -40,10 +40,10 @@ def alarms_told(alarms: tuple[object, ...]) -> list[dict[str, Any]]:
 def plain(value: Any) -> Any:
     """A value as JSON can hold it."""
     if isinstance(value, dict):
-        return {str(key): plain(each) for key, each in value.items()}
+        return {str(key): plain(each) for key, each in cast(Mapping[Any, Any], value).items()}
 
     if isinstance(value, (list, tuple)):
-        return [plain(each) for each in value]
+        return [plain(each) for each in cast(Sequence[Any], value)]
 
     if isinstance(value, float) and not math.isfinite(value):
         return None

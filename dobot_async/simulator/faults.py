@@ -54,7 +54,9 @@ class Faults:
         stalled: A switch: a stream keeps everything back, in order, until this is false again; datagrams are lost.
     """
 
-    _released: dict[Callable[[], None], None] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _released: dict[Callable[[], None], None] = field(
+        default_factory=dict[Callable[[], None], None], init=False, repr=False, compare=False
+    )
     loss: float = 0.0
     corrupt: float = 0.0
     dup: float = 0.0
@@ -141,7 +143,7 @@ class LineState:
         silent_until: When the silence ends.
     """
 
-    outages: list[tuple[float, float]] = field(default_factory=list)
+    outages: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
     silent_until: float = -math.inf
 
 

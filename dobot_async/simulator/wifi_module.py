@@ -9,7 +9,7 @@ The answer has no port: whoever reads it takes the arm to be at 8899, so that is
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from ipaddress import IPv4Address
 from typing import Any, cast
@@ -24,7 +24,7 @@ MODULE = "USR-C322,2.17.14"
 
 
 @asynccontextmanager
-async def announced(url: str, host: str = ANY, port: int = PORT) -> AsyncIterator[int]:
+async def announced(url: str, host: str = ANY, port: int = PORT) -> AsyncGenerator[int]:
     """Answers searches for a simulated arm for the length of a block; yields the port at which it is asked.
 
     Args:

@@ -9,13 +9,13 @@ The steps of a recording are in the words of the arm's family: no family plays a
 
 from __future__ import annotations
 
-from dobot_async.teaching.arms import check_recording
 from dobot_async.teaching.files import from_json, load_recording, save_recording, to_json
 from dobot_async.teaching.playback_file import read_playback, write_playback
 from dobot_async.teaching.player import play
 from dobot_async.teaching.problems import RecordingFileError, RecordingUnfit
 from dobot_async.teaching.recorder import Recorder, released
 from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
+from dobot_async.teaching.registry import check_recording
 
 __all__ = [
     "PathSample",

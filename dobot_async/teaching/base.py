@@ -7,12 +7,12 @@ taught     an arm: where it is, how it goes to a step, how it is jogged and led
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Collection, Sequence
+from collections.abc import AsyncGenerator, Collection, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any
 
 from dobot_async.errors import CommandRejected, UnsupportedError
-from dobot_async.hands import settle_time, stop_check
+from dobot_async.handling.arms import settle_time, stop_check
 from dobot_async.teaching.recording import Mode, PathSample, Recording, TaughtStep
 
 __all__ = ["Limits", "TaughtArm", "clip"]
@@ -159,12 +159,12 @@ class TaughtArm(ABC):
         """Jog until the block ends."""
 
     @asynccontextmanager
-    async def at_speed(self, percent: float | None) -> AsyncIterator[None]:  # noqa: ARG002 - where each motion has its own
+    async def at_speed(self, percent: float | None) -> AsyncGenerator[None]:  # noqa: ARG002 - where each motion has its own
         """Set what is set once for all motions of the block, and set it back behind it."""
         yield
 
     @asynccontextmanager
-    async def jogs(self, percent: float) -> AsyncIterator[None]:  # noqa: ARG002 - where each jog has its own
+    async def jogs(self, percent: float) -> AsyncGenerator[None]:  # noqa: ARG002 - where each jog has its own
         """Set what is set once for all jogs of the block, and set it back behind it."""
         yield
 

@@ -15,7 +15,7 @@ import json
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from dobot_async.program.text import read_text, shortened
 from dobot_async.teaching.playback_file import read_playback, write_playback
@@ -44,7 +44,7 @@ def to_json(recording: Recording) -> str:
 
 def given(value: Any, without: Collection[str] = ()) -> dict[str, Any]:
     """What differs from what it is by default."""
-    found = {}
+    found: dict[str, Any] = {}
     for each in fields(value):
         here = getattr(value, each.name)
         if each.name not in without and (each.default is MISSING or here != each.default):
@@ -64,11 +64,12 @@ def from_json(text: str, name: str = "") -> Recording:
         RecordingFileError: It is no such text, or of a later version; or something in it is wrong.
     """
     try:
-        found = json.loads(text, parse_constant=refuse)
+        read: object = json.loads(text, parse_constant=refuse)
     except (ValueError, RecursionError) as error:
         raise RecordingFileError(name, "", f"no JSON: {error}") from None
 
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
+    found: dict[str, Any] = cast("dict[str, Any]", read) if isinstance(read, dict) else {}
+    if found.get("format") != FORMAT:
         raise RecordingFileError(name, "", f'no recording: it has no "format": "{FORMAT}"')
 
     version = found.get("version")
@@ -81,7 +82,8 @@ def from_json(text: str, name: str = "") -> Recording:
         if not isinstance(entries, list):
             raise RecordingFileError(name, key, f"a list, not {shortened(repr(entries))}")
 
-        head[key] = tuple(made(kind, entry, name, f"{key} {number}") for number, entry in enumerate(entries, 1))
+        listed = enumerate(cast("list[object]", entries), 1)
+        head[key] = tuple(made(kind, entry, name, f"{key} {number}") for number, entry in listed)
 
     recording: Recording = made(Recording, head, name, "")
     return recording
@@ -92,11 +94,13 @@ def refuse(word: str) -> None:
     raise ValueError(f"{word} is no number")
 
 
-def made(kind: type[Any], values: object, name: str, place: str) -> Any:
+def made(kind: type[Any], read: object, name: str, place: str) -> Any:
     """Make a record of what a file has for it."""
     known = [each.name for each in fields(kind) if each.name != "remarks"]
-    if not isinstance(values, Mapping):
-        raise RecordingFileError(name, place, f"an object, not {shortened(repr(values))}")
+    if not isinstance(read, Mapping):
+        raise RecordingFileError(name, place, f"an object, not {shortened(repr(read))}")
+
+    values = cast("Mapping[str, Any]", read)
 
     for key in values:
         if key not in known:

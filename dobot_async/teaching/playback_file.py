@@ -201,7 +201,7 @@ def write_playback(recording: Recording) -> str:
         RecordingUnfit: It is no Magician's, or a path; or a step goes to joints, opens the gripper partly, or there are
             both suction and gripper.
     """
-    problems = []
+    problems: list[str] = []
     if recording.family != "magician":
         problems.append(f"DobotStudio's files are a Magician's, and this is of a {recording.family}")
 

@@ -25,7 +25,7 @@ class Element:
 
     name: str
     line: int
-    items: dict[int, str] = field(default_factory=dict)
+    items: dict[int, str] = field(default_factory=dict[int, str])
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,10 +13,10 @@ from typing import Any, SupportsFloat, SupportsIndex
 
 from dobot_async._core.util.arguments import to_float
 from dobot_async.arms.base import Arm
-from dobot_async.teaching.arms import check_recording, taught
 from dobot_async.teaching.base import TaughtArm
 from dobot_async.teaching.problems import RecordingUnfit
 from dobot_async.teaching.recording import Recording
+from dobot_async.teaching.registry import check_recording, taught
 
 __all__ = ["play"]
 
@@ -63,7 +63,7 @@ async def play(
         recording = recording.reversed()
 
     check_recording(recording, arm)
-    report = progress or (lambda done, total: None)  # noqa: ARG005 - nobody wants to know
+    report: Progress = progress or (lambda done, total: None)  # noqa: ARG005 - nobody wants to know
     player = taught(arm)
     async with player.at_speed(None if recording.path else percent):
         state: dict[str, Any] = {}

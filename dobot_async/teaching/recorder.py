@@ -11,11 +11,11 @@ from typing import Any, SupportsFloat, cast
 
 from dobot_async._core.util.arguments import check_duration, to_float
 from dobot_async.arms.base import Arm
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.magician.params import Pose
 from dobot_async.errors import UnsupportedError
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.params import Pose
-from dobot_async.teaching.arms import taught
 from dobot_async.teaching.recording import Mode, PathSample, Recording, TaughtStep
+from dobot_async.teaching.registry import taught
 
 __all__ = ["Recorder", "released"]
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal, SupportsFloat, cast, get_args
 
 from dobot_async._core.util.arguments import check_choice, check_duration, to_float
 
@@ -32,7 +32,7 @@ def numbers(values: Any, name: str) -> tuple[float, ...]:
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise TypeError(f"{name} must be numbers, not {values!r}")
 
-    found = tuple(to_float(each, f"each of {name}") for each in values)
+    found = tuple(to_float(each, f"each of {name}") for each in cast("Iterable[SupportsFloat]", values))
     if len(found) > MOST_NUMBERS or not all(map(math.isfinite, found)):
         raise ValueError(f"{name} must be at most {MOST_NUMBERS} finite numbers, not {found!r}")
 
@@ -197,7 +197,7 @@ class Recording:
             before.append({tool: state[tool] if tool in changes else None for tool in state})
             state.update(changes)
 
-        found = []
+        found: list[TaughtStep] = []
         for number in range(len(self.steps) - 1, -1, -1):
             # The way to a step, seen from its end, is the way to the step before it.
             way = self.steps[number + 1] if number + 1 < len(self.steps) else None
@@ -253,7 +253,7 @@ def _miss(start: PathSample, each: PathSample, end: PathSample) -> float:
 def said_once(steps: Sequence[TaughtStep]) -> tuple[TaughtStep, ...]:
     """Return steps in which the state of a tool is given where it changes, and nowhere else."""
     state: dict[str, Any] = dict.fromkeys(TOOLS)
-    found = []
+    found: list[TaughtStep] = []
     for step in steps:
         repeated: dict[str, Any] = {}
         for tool, before in state.items():

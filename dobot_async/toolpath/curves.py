@@ -24,7 +24,7 @@ def bezier(tolerance: float, *controls: complex) -> list[complex]:
     count = ways(math.sqrt(degree * (degree - 1) * bend / (8 * tolerance)))
 
     def at(share: float) -> complex:
-        points = list(controls)
+        points: list[complex] = list(controls)
         while len(points) > 1:
             points = [a + (b - a) * share for a, b in pairwise(points)]
         return points[0]

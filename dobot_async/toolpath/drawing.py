@@ -21,9 +21,10 @@ from typing import Any, SupportsFloat
 
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.util.tasks import cancel_and_join
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, another
-from dobot_async.magician.arm import Magician
-from dobot_async.mycobot.arm import MyCobot
 from dobot_async.toolpath.moves import Move, Tool, approach, check_moves, from_point
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.position import Position, Sent, along, stand_of
@@ -42,7 +43,6 @@ from dobot_async.toolpath.schedule import (
     whole_percent,
 )
 from dobot_async.toolpath.toolpath import Toolpath
-from dobot_async.ultraarm.arm import UltraArm
 
 __all__ = ["Drawing", "DrawingArm", "draw", "engrave"]
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
-from dobot_async.magician.kinematics import BEYOND_LIMIT, Unreachable
+from dobot_async.arms.magician.kinematics import BEYOND_LIMIT, Unreachable
 
 __all__ = ["MissingLibrary", "ToolpathFileError", "UnreachableStroke", "library"]
 
@@ -54,7 +54,7 @@ class UnreachableStroke(Unreachable):
 
 
 @contextmanager
-def library() -> Iterator[None]:
+def library() -> Generator[None]:
     """Around the import of a library of the extra: say which extra it is in if it is missing."""
     try:
         yield

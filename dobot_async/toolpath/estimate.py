@@ -6,27 +6,27 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, SupportsFloat
 
+from dobot_async._core.protocol.wire import Command
+from dobot_async.arms.magician import commands as m
+from dobot_async.arms.magician import frame as magician_frame
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.magician.kinematics import Kinematics
+from dobot_async.arms.mycobot import frame as cobot_frame
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.mycobot.models import MODELS, CobotModel
+from dobot_async.arms.ultraarm import commands as u
+from dobot_async.arms.ultraarm import frame as ultraarm_frame
+from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import UnsupportedError
-from dobot_async.magician import commands as m
-from dobot_async.magician import frame as magician_frame
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.kinematics import Kinematics
-from dobot_async.mycobot import frame as cobot_frame
-from dobot_async.mycobot.arm import MyCobot
-from dobot_async.mycobot.models import MODELS, CobotModel
-from dobot_async.simulator.magician import MAGICIAN, SimulatedMagician
-from dobot_async.simulator.mycobot import SimulatedMyCobot
-from dobot_async.simulator.mycobot_body import MYCOBOT
-from dobot_async.simulator.ultraarm import ULTRAARM, SimulatedUltraArm
+from dobot_async.simulator.magician.arm import MAGICIAN, SimulatedMagician
+from dobot_async.simulator.mycobot.arm import SimulatedMyCobot
+from dobot_async.simulator.mycobot.body import MYCOBOT
+from dobot_async.simulator.ultraarm.arm import ULTRAARM, SimulatedUltraArm
 from dobot_async.toolpath.moves import Kind, Tool, approach
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.programs import CobotProgram, MagicianProgram, Pace, Program, UltraArmProgram
 from dobot_async.toolpath.schedule import RATE, TOLERANCE, planned
 from dobot_async.toolpath.toolpath import Toolpath
-from dobot_async.ultraarm import commands as u
-from dobot_async.ultraarm import frame as ultraarm_frame
-from dobot_async.ultraarm.arm import UltraArm
-from dobot_async.wire import Command
 
 __all__ = ["Estimate", "estimate"]
 

@@ -66,9 +66,9 @@ class Machine:
     on: bool = False
     power: float = FULL
     origin: complex = 0j
-    strokes: list[Stroke] = field(default_factory=list)
-    points: list[Point] = field(default_factory=list)
-    powers: list[float] = field(default_factory=list)
+    strokes: list[Stroke] = field(default_factory=list[Stroke])
+    points: list[Point] = field(default_factory=list[Point])
+    powers: list[float] = field(default_factory=list[float])
     speed: float | None = None
 
     def run(self, line: Line) -> None:

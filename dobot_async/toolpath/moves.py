@@ -95,7 +95,7 @@ def approach(here: Place, moves: Sequence[Move], plane: WorkPlane) -> list[Move]
     first = moves[0]
     at = plane.to_plane(*here)
     above = plane.to_plane(*first.place)
-    found = []
+    found: list[Move] = []
     if at.height < plane.lift - SAME:
         found.append(replace(first, kind=Kind.TRAVEL, place=plane.to_arm(at.x, at.y, plane.lift)))
 

@@ -203,7 +203,7 @@ def ordered(strokes: Sequence[Stroke], start: Point | None, *, reverse: bool = T
 def greedy(strokes: Sequence[Stroke], start: Point | None, *, reverse: bool) -> list[Stroke]:
     """Always to the nearest end."""
     ends = Ends(strokes, side_for(strokes), backward=reverse)
-    found = []
+    found: list[Stroke] = []
     here = start or strokes[0].start
     while (nearest := ends.nearest(here)) is not None:
         number, end = nearest

@@ -199,7 +199,7 @@ def grey(dark: Darkness, scale: tuple[float, float]) -> Iterator[Stroke]:
         y = (len(dark) - number - 0.5) * scale[1]
         levels = [round(value * LEVELS) / LEVELS if value > FAINT else 0.0 for value in row]
         x = 0
-        strokes = []
+        strokes: list[Stroke] = []
         while x < len(levels):
             if not levels[x]:
                 x += 1

@@ -16,8 +16,8 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async.magician import commands as m
-from dobot_async.magician.arm import Magician
+from dobot_async.arms.magician import commands as m
+from dobot_async.arms.magician.arm import Magician
 from dobot_async.toolpath.moves import SAME, Kind, Move
 from dobot_async.toolpath.plane import Place
 

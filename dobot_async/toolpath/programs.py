@@ -16,17 +16,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
+from dobot_async._core.protocol.wire import Command
+from dobot_async.arms.magician import commands as m
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.magician.kinematics import Kinematics, Unreachable
+from dobot_async.arms.mycobot import commands as b
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.ultraarm import commands as u
+from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import UnsupportedError
-from dobot_async.magician import commands as m
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.kinematics import Kinematics, Unreachable
-from dobot_async.mycobot import commands as b
-from dobot_async.mycobot.arm import MyCobot
 from dobot_async.toolpath.moves import Kind, Move, Tool
 from dobot_async.toolpath.plane import Place
-from dobot_async.ultraarm import commands as u
-from dobot_async.ultraarm.arm import UltraArm
-from dobot_async.wire import Command
 
 __all__ = ["Instruction", "Pace", "Program", "program_for"]
 
@@ -60,6 +60,7 @@ class Program(Protocol):
 
     def instructions(self, moves: Iterable[Move]) -> Iterator[Instruction]:
         """Yield the commands of a whole drawing, in order."""
+        ...
 
 
 class MagicianProgram:

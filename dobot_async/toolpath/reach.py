@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, SupportsFloat
 
-from dobot_async.magician.arm import Magician
-from dobot_async.magician.kinematics import BEYOND_LIMIT, Kinematics, Unreachable
-from dobot_async.mycobot.arm import MyCobot
-from dobot_async.mycobot.models import CobotModel
+from dobot_async.arms.magician.arm import Magician
+from dobot_async.arms.magician.kinematics import BEYOND_LIMIT, Kinematics, Unreachable
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.mycobot.models import CobotModel
+from dobot_async.arms.ultraarm.arm import UltraArm
+from dobot_async.arms.ultraarm.limits import UltraArmLimits
+from dobot_async.arms.ultraarm.params import CoordsMove
 from dobot_async.toolpath.moves import Reach, Tool, check_moves
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.schedule import TOLERANCE, planned, position_in, simplified
 from dobot_async.toolpath.toolpath import Toolpath
-from dobot_async.ultraarm.arm import UltraArm
-from dobot_async.ultraarm.params import CoordsMove, UltraArmLimits
 
 __all__ = ["check_toolpath", "reach_of", "reachable"]
 

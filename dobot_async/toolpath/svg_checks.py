@@ -39,7 +39,7 @@ class Node:
     tag: str
     attributes: dict[str, str]
     line: int
-    children: list[Node] = field(default_factory=list)
+    children: list[Node] = field(default_factory=list["Node"])
     text: str = ""
 
     def walk(self) -> Iterator[Node]:

@@ -71,7 +71,7 @@ def write_line(glyphs: list[Any], size: float, base: float, spacing: float, alig
     scales = [size / (glyph.base_line - glyph.cap_line) for glyph in glyphs]
     widths = [glyph.char_width * scale + spacing for glyph, scale in zip(glyphs, scales, strict=True)]
     at = -SHARES[align] * (sum(widths) - spacing)
-    strokes = []
+    strokes: list[Stroke] = []
     for glyph, scale, width in zip(glyphs, scales, widths, strict=True):
         left = at - glyph.left_offset * scale
         for line in glyph.strokes:

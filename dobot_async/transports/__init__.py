@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import re
 from importlib import import_module
 from typing import Any, cast
-from urllib.parse import unquote, urlsplit
+from urllib.parse import urlsplit
 
-from dobot_async.transports.base import Transport
+from dobot_async._core.protocol.transport import Transport
+from dobot_async._core.util.urls import hidden
 
-__all__ = ["SCHEMES", "Transport", "hidden", "open_transport"]
+__all__ = ["SCHEMES", "Transport", "open_transport"]
 
-USER = re.compile(r"(?<=//)[^/?#]*@")
-SECRET = re.compile(r"token(?!_file$)|password|secret|key", re.IGNORECASE)
-NAME = re.compile(r"[?&;#]([^=?&;#]*)=")
 SCHEMES = {
     "serial": ("dobot_async.transports.serial", "serial:///dev/ttyUSB0, serial://COM3 (?baud=115200)"),
     "udp": ("dobot_async.transports.network", "udp://192.168.1.20 (port 8899)"),
     "tcp": ("dobot_async.transports.network", "tcp://host:port"),
     "ws": ("dobot_async.transports.websocket", "ws://host:port (a bridge; ?token=)"),
     "wss": ("dobot_async.transports.websocket", "wss://host:port (?token=&ca=)"),
-    "zenoh": ("dobot_async.transports.zenoh", "zenoh://NAME (a served arm; ?connect=tcp/host:port&config=FILE)"),
-    "ble": ("dobot_async.transports.ble", "ble://NAME, ble://ADDRESS, ble: (the first arm in range)"),
-    "sim": ("dobot_async.simulator.endpoints", "sim: (?speed=10&seed=1&loss=0.05&latency=0.01)"),
+    "zenoh": (
+        "dobot_async.transports.zenoh.transport",
+        "zenoh://NAME (a served arm; ?connect=tcp/host:port&config=FILE)",
+    ),
+    "ble": ("dobot_async.transports.ble.opening", "ble://NAME, ble://ADDRESS, ble: (the first arm in range)"),
+    "sim": ("dobot_async.simulator.url", "sim: (?speed=10&seed=1&loss=0.05&latency=0.01)"),
 }
 
 
@@ -45,17 +45,6 @@ async def open_transport(url: str, *, arm: str) -> Transport:
         # What it quotes of the URL may be the secret.
         reason = "the port is no number" if shown != url and str(error).startswith("Port") else error
         raise ValueError(f"{shown!r}: {reason}") from None
-
-
-def hidden(url: str) -> str:
-    """Returns a URL as it may be shown: without its token, however it is written, and without a user's password."""
-    rest, shown = USER.sub("...@", url), ""
-    while secret := next((found for found in NAME.finditer(rest) if SECRET.search(unquote(found[1]).strip())), None):
-        shown += f"{rest[: secret.end()]}..."
-        _, more, rest = rest[secret.end() :].partition("&")
-        rest = more + rest
-
-    return shown + rest
 
 
 def module_of(scheme: str) -> Any:

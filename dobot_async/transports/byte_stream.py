@@ -15,7 +15,7 @@ from typing import Any
 
 import anyio
 
-from dobot_async.transports.base import MANY
+from dobot_async._core.protocol.transport import MANY
 
 __all__ = ["BUFFER", "DRAIN", "WINDOW", "ByteStreamTransport"]
 

@@ -7,7 +7,8 @@ import math
 import anyio
 from anyio.streams.stapled import StapledObjectStream
 
-from dobot_async.transports.base import MANY, StreamTransport, Transport
+from dobot_async._core.protocol.transport import MANY, Transport
+from dobot_async.transports.stream import StreamTransport
 
 __all__ = ["memory_pair"]
 

@@ -13,9 +13,11 @@ from urllib.parse import SplitResult
 
 import anyio
 
+from dobot_async._core.protocol.transport import Transport
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.base import Option, StreamTransport, Transport, number, options, words
 from dobot_async.transports.byte_stream import WINDOW
+from dobot_async.transports.options import Option, number, options, words
+from dobot_async.transports.stream import StreamTransport
 from dobot_async.transports.tcp import connect
 
 __all__ = ["CA", "LONGEST_TOKEN", "TOKENS", "UDP_PORT", "WINDOW", "open_url", "secret", "token_in", "token_of", "trust"]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 
-from dobot_async.transports.base import Transport
+from dobot_async._core.protocol.transport import Transport
 
 __all__ = ["Paced"]
 

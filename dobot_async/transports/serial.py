@@ -17,9 +17,10 @@ from urllib.parse import SplitResult
 import serial
 from serial_asyncio import connection_for_serial
 
+from dobot_async._core.protocol.transport import Transport
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.base import Transport, number, options
 from dobot_async.transports.byte_stream import DRAIN, ByteStreamTransport
+from dobot_async.transports.options import number, options
 
 __all__ = ["SerialTransport", "open_url"]
 

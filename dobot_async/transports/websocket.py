@@ -10,10 +10,11 @@ from urllib.parse import SplitResult
 
 import anyio
 
+from dobot_async._core.protocol.transport import MANY, Transport
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.base import MANY, Transport, options
 from dobot_async.transports.keep_alive import keep_alive
 from dobot_async.transports.network import CA, TOKENS, WINDOW, token_of, trust
+from dobot_async.transports.options import options
 
 __all__ = ["WebSocketTransport", "open_url", "quiet", "websockets"]
 

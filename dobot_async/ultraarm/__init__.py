@@ -1,1 +1,1 @@
-"""The Elephant Robotics ultraArm P340: lines of G-code, a queue without indices, replies without numbers."""
+"""The commands of the ultraArm P340 for users: `from dobot_async.ultraarm import commands`."""

@@ -15,7 +15,7 @@ from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 import pydobotlab
 import pytest
@@ -24,7 +24,7 @@ from pydobotlab import CommandID
 from pydobotlab.protocol import pack_u8
 
 from dobot_async import Magician
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 
 PINS = range(1, 21)
 HOME = (259.104, 0, -8.485, 0, 0, 45, 45, 0)

@@ -12,9 +12,9 @@ import pytest
 from bridge_rig import IN_TIME, TCP, Plain, Rig, ask, bridged, client, far, numbers, set_now, until
 
 from dobot_async import ConnectFailed, ConnectionLost, Magician
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame, encode
 from dobot_async.bridge import Limits, bridge
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame, encode
 from dobot_async.simulator import Faults, simulate
 
 PLACES = ["tcp://127.0.0.1:0", "udp://127.0.0.1:0", "ws://127.0.0.1:0", "pty"]

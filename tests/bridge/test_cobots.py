@@ -14,16 +14,17 @@ from bridge_rig import IN_TIME, TCP, until
 from virtual_ports import on_the_virtual_clock, virtual_ports
 
 from dobot_async import MotionStopped, MyCobot
+from dobot_async._core.protocol.transport import Transport
+from dobot_async._core.protocol.wire import Command
+from dobot_async.arms.bridge_adapter import Kind
+from dobot_async.arms.mycobot import commands as c
+from dobot_async.arms.mycobot import frame as f
+from dobot_async.arms.mycobot.bridge_adapter import BRIDGED, CobotWatch
+from dobot_async.arms.mycobot.models import MODELS
 from dobot_async.bridge import Bridge, BridgeEvent, bridge
-from dobot_async.bridged import Kind
 from dobot_async.errors import ConnectFailed, ConnectionLost, ProtocolError
-from dobot_async.mycobot import commands as c
-from dobot_async.mycobot import frame as f
-from dobot_async.mycobot.bridged import BRIDGED, CobotWatch
-from dobot_async.mycobot.models import MODELS
 from dobot_async.simulator import MyCobotQuirks, Simulation, simulate
-from dobot_async.transports import Transport, open_transport
-from dobot_async.wire import Command
+from dobot_async.transports import open_transport
 
 __all__ = ["virtual_ports"]
 

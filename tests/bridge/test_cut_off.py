@@ -17,11 +17,11 @@ from cryptography.hazmat.primitives.serialization import (
 from websockets.asyncio.client import connect
 
 from dobot_async import Magician
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import encode
 from dobot_async.bridge import Limits
 from dobot_async.bridge.doors import Doors
 from dobot_async.bridge.handshake import PENDING
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import encode
 
 GET_POSE = encode(ask(c.GET_POSE))
 

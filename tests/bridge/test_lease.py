@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from virtual import virtual
 
+from dobot_async.arms.mycobot import commands as c
+from dobot_async.arms.mycobot.bridge_adapter import BRIDGED, CobotWatch
+from dobot_async.arms.mycobot.frame import Frame
+from dobot_async.arms.mycobot.models import MODELS
 from dobot_async.bridge.lease import Lease
 from dobot_async.bridge.standstill import Standstill
-from dobot_async.mycobot import commands as c
-from dobot_async.mycobot.bridged import BRIDGED, CobotWatch
-from dobot_async.mycobot.frame import Frame
-from dobot_async.mycobot.models import MODELS
 
 MODEL = MODELS["mycobot280"]
 

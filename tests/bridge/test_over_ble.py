@@ -12,15 +12,15 @@ import pytest
 from bridge_rig import ask, client, far, until
 
 from dobot_async import Magician
+from dobot_async.arms.magician import commands as c
 from dobot_async.bridge import bridge
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 if sys.platform != "linux":
     pytest.skip("BlueZ is Linux's", allow_module_level=True)
 
-from dobot_async.simulator.ble_rig import rig
-from dobot_async.simulator.radio import Radio
+from dobot_async.simulator.ble.link_layer import Radio
+from dobot_async.simulator.ble.testbed import rig
 
 if not shutil.which("dbus-daemon") and not os.environ.get("DOBOT_REQUIRE_DBUS"):
     pytest.skip("dbus-daemon is not installed (Debian: apt install dbus-daemon)", allow_module_level=True)

@@ -19,14 +19,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dobot_async import Magician
+from dobot_async._core.protocol.transport import MANY
 from dobot_async._core.util.text import LONGEST, printable
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import encode
 from dobot_async.bridge import handshake
 from dobot_async.bridge.families import FAMILIES, family_of
 from dobot_async.bridge.handshake import PENDING, Authenticator, Handshakes, TokenHandshake
 from dobot_async.bridge.limits import Allowance
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import encode
-from dobot_async.transports.base import MANY
 
 TOKEN = "geheim-4711"
 PEM = Path(__file__).with_name("localhost.pem")
@@ -106,7 +106,7 @@ async def test_who_says_nothing_has_not_long(listen: str, tls: bool, monkeypatch
 
 
 async def test_tls_has_not_long_either_where_there_is_no_token(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dobot_async.transports.listen.TLS_WITHIN", 0.05)
+    monkeypatch.setattr("dobot_async.endpoints.listeners.TLS_WITHIN", 0.05)
     async with bridged(certificate=PEM) as rig, silent(rig.url, 1) as (one,):
         with suppress(ConnectionResetError):
             assert await asyncio.get_running_loop().sock_recv(one, 1) == b""

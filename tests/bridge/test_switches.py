@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from dobot_async.bridged import Switch, Watch
-from dobot_async.magician import bridged as magician
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame, Parser, request
+from dobot_async.arms.bridge_adapter import Switch, Watch
+from dobot_async.arms.magician import bridge_adapter as magician
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame, Parser, request
+from dobot_async.arms.ultraarm import bridge_adapter as ultraarm
+from dobot_async.arms.ultraarm.bridge_lines import Line
+from dobot_async.arms.ultraarm.frame import END
 from dobot_async.simulator import SimulatedMagician, SimulatedUltraArm, UltraArmQuirks
-from dobot_async.ultraarm import bridged as ultraarm
-from dobot_async.ultraarm.bridged_lines import Line
-from dobot_async.ultraarm.frame import END
 
 LATER = 60.0  # seconds
 

@@ -13,7 +13,7 @@ from pydobotlab.config import default_config, set_config
 from side_by_side import side_by_side
 
 from dobot_async import Magician
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 
 
 @pytest.fixture(autouse=True)

@@ -15,13 +15,13 @@ from bridge_rig import IN_TIME, Plain, Rig, ask, bridged, client, far, until
 from zenoh_rig import configured, connect_to, endpoint, keep, place, session, warm_up, written
 
 from dobot_async import ConnectFailed, ConnectionLost, Magician, discover
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import encode
 from dobot_async.bridge import Limits, bridge
 from dobot_async.discovery.zenoh import ZenohArms
 from dobot_async.fleet import Fleet
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import encode
 from dobot_async.transports import open_transport
-from dobot_async.transports.zenoh_messages import DATA, END, HEADER
+from dobot_async.transports.zenoh.messages import DATA, END, HEADER
 
 GET_POSE = encode(ask(c.GET_POSE))
 
@@ -317,7 +317,7 @@ async def test_a_server_that_loses_an_answer_is_not_believed() -> None:
 
 
 async def test_who_receives_nothing_is_told_so_and_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dobot_async.transports.zenoh.UNREAD", 1000)
+    monkeypatch.setattr("dobot_async.transports.zenoh.transport.UNREAD", 1000)
     async with bridged(place()) as rig:
         transport = await open_transport(rig.url, arm="magician")
         with pytest.raises(anyio.BrokenResourceError) as broken:
@@ -415,7 +415,7 @@ async def test_a_server_that_goes_while_it_lets_somebody_in_has_just_gone() -> N
 
 
 async def test_an_arm_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dobot_async.transports.zenoh.PRESENT", 0.3)
+    monkeypatch.setattr("dobot_async.transports.zenoh.transport.PRESENT", 0.3)
     async with bridged(place()) as rig:
         with pytest.raises(ConnectFailed, match="no arm called right is on Zenoh"):
             await open_transport(rig.url.replace("left", "right"), arm="magician")

@@ -13,12 +13,12 @@ from bridge_rig import IN_TIME, ask, bridged, client, until
 from zenoh_rig import endpoint, line, place, processes_ended, program, warm_up, written
 
 from dobot_async import ConnectionLost, Magician
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import encode
 from dobot_async.bridge import Limits
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import encode
 from dobot_async.transports import open_transport
-from dobot_async.transports.zenoh_place import Place
-from dobot_async.transports.zenoh_session import Session
+from dobot_async.transports.zenoh.config import Place
+from dobot_async.transports.zenoh.session import Session
 
 BUFFERS = {"so_sndbuf": 4096, "so_rcvbuf": 4096}
 MANY = Limits(frames=1e6, data=1e7)
@@ -66,7 +66,7 @@ def runtime() -> None:
 @pytest.fixture(autouse=True)
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is waited for at the end, once somebody does not read, is short."""
-    monkeypatch.setattr("dobot_async.transports.zenoh_session.CLOSED", 0.5)
+    monkeypatch.setattr("dobot_async.transports.zenoh.session.CLOSED", 0.5)
 
 
 @pytest.fixture(autouse=True)

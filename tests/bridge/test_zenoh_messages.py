@@ -11,8 +11,8 @@ from bridge_rig import until
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dobot_async.transports import zenoh_messages
-from dobot_async.transports.zenoh_messages import DATA, END, HEADER, MESSAGE, MOST, Lost, Numbered, Outbox
+from dobot_async.transports.zenoh import messages as zenoh_messages
+from dobot_async.transports.zenoh.messages import DATA, END, HEADER, MESSAGE, MOST, Lost, Numbered, Outbox
 
 
 @given(st.lists(st.binary(max_size=8), min_size=1), st.data())

@@ -15,10 +15,10 @@ from bridge_rig import Rig, bridged, until
 from zenoh_rig import configured, endpoint, keep, warm_up
 
 from dobot_async import ConnectFailed, Magician
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import encode, request
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import encode, request
 from dobot_async.transports import open_transport
-from dobot_async.transports.zenoh_messages import DATA, HEADER
+from dobot_async.transports.zenoh.messages import DATA, HEADER
 
 FILES = Path(__file__).parents[2] / "examples" / "zenoh"
 JOG = encode(request(c.SET_JOG_CMD, c.SET_JOG_CMD.request.encode(c.JOGCmd(False, c.JOGKey.AP_DOWN)), queued=False))

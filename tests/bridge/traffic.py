@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).parents[1]))
+    sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from dobot_async import Magician, MyCobot, UltraArm
 from dobot_async.bridge import bridge
 from dobot_async.errors import ConnectFailed, ConnectionLost, DobotError
 from dobot_async.simulator import Simulation, simulate
-from dobot_async.simulator.magician_body import MAGICIAN
+from dobot_async.simulator.magician.body import MAGICIAN
 
 __all__ = ["FAMILIES", "Figures", "Programs", "bare", "through_a_bridge"]
 

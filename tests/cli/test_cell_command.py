@@ -17,11 +17,11 @@ import pytest
 from click.testing import CliRunner
 
 from dobot_async import Magician
+from dobot_async.arms.magician import commands as c
 from dobot_async.cli.cell_program import parse_cell_program
 from dobot_async.cli.cell_watch import observe
 from dobot_async.cli.main import cli
 from dobot_async.fleet.cell import parse_cell, read_cell
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 CELL = """

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
+from dobot_async.arms.mycobot.models import MODELS
 from dobot_async.cli.main import cli
-from dobot_async.mycobot.models import MODELS
 
 OWN = "sim:?speed=50"
 

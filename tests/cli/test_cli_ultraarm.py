@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
+from dobot_async.arms.ultraarm import commands as c
 from dobot_async.cli.main import cli
 from dobot_async.simulator import simulate
-from dobot_async.ultraarm import commands as c
 
 OWN = "sim:?speed=50"
 

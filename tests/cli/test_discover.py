@@ -17,12 +17,12 @@ import pytest
 from click.testing import CliRunner
 
 from dobot_async import DeviceInfo, Found
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame
 from dobot_async.cli.arms.magician_frames import described
-from dobot_async.cli.discover import table
+from dobot_async.cli.commands.discover import table
 from dobot_async.cli.main import cli
 from dobot_async.cli.trace import Trace, TraceFile
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame
 from dobot_async.simulator import Simulation, announced, simulate
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has a whole network on its loopback")

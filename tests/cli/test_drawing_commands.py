@@ -21,8 +21,8 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 from dobot_async import MyCobot, Pen, UltraArm
+from dobot_async.arms.magician import commands as m
 from dobot_async.cli.main import cli
-from dobot_async.magician import commands as m
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.toolpath import WorkPlane, read_picture, read_svg, write_text
 

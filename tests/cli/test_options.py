@@ -14,10 +14,10 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.registry import Parts
 from dobot_async.cli.addresses import connectable
 from dobot_async.cli.main import COMMANDS, cli
-from dobot_async.families import Parts
-from dobot_async.magician import commands as c
 
 SIM = "sim:?speed=50"
 
@@ -258,14 +258,26 @@ def imported(source: str) -> set[str]:
 @pytest.mark.parametrize("option", ["--version", "--help"])
 def test_what_needs_no_arm_imports_none(option: str) -> None:
     found = imported(f"from dobot_async.cli.main import cli\ncli(['{option}'], standalone_mode=False)")
-    assert not found & {"asyncio", "anyio", "rich", "serial", "dobot_async.wire", "dobot_async.cli.session"}
+    assert not found & {
+        "asyncio",
+        "anyio",
+        "rich",
+        "serial",
+        "dobot_async._core.protocol.wire",
+        "dobot_async.cli.session",
+    }
 
 
 def test_a_command_imports_its_own_family_alone() -> None:
     nowhere = "['--url', 'tcp://127.0.0.1:1', 'alarms']"
     found = imported(f"from dobot_async.cli.main import cli\ncli({nowhere}, standalone_mode=False)")
-    assert "dobot_async.magician.arm" in found
-    assert not found & {"dobot_async.mycobot.arm", "dobot_async.ultraarm.arm", "dobot_async.fleet.fleet", "rich"}
+    assert "dobot_async.arms.magician.arm" in found
+    assert not found & {
+        "dobot_async.arms.mycobot.arm",
+        "dobot_async.arms.ultraarm.arm",
+        "dobot_async.fleet.fleet",
+        "rich",
+    }
 
 
 @pytest.mark.parametrize("name", COMMANDS)

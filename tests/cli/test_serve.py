@@ -14,7 +14,7 @@ from bridge_rig import bridged, until
 from zenoh_rig import endpoint, line, place, processes_ended, program, warm_up
 
 from dobot_async import ConnectionLost, Magician, MotionUnknown
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 TCP = "tcp://127.0.0.1:0"

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.teaching import PathSample, Recording, TaughtStep, load_recording, save_recording
 

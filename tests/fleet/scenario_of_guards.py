@@ -20,8 +20,8 @@ from monitor import Monitor, Stand, Violation, Zone, true_joints
 from virtual import run_virtual
 
 from dobot_async import ConnectionLost, DobotError, Fleet, Jog, Magician, PTPMode
+from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Cylinder, Member
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate
 
 __all__ = ["Figures", "Violation", "run_seed"]

@@ -12,8 +12,8 @@ import pytest
 from virtual import virtual
 
 from dobot_async import Fleet, Magician, MotionStopped, MotionUnknown, ReplyTimeout
+from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import Member
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 NEAR, FAR = (220.0, 0.0, 40.0), (240.0, 60.0, 60.0)

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dobot_async import Kinematics, PTPMode, Unreachable
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.kinematics import Joints
+from dobot_async.arms.magician.paths import STEP, Lift, Way, way_of
 from dobot_async.fleet import BaseFrame, Box, Cylinder
-from dobot_async.magician import commands as c
-from dobot_async.magician.kinematics import Joints
-from dobot_async.magician.paths import STEP, Lift, Way, way_of
 
 Four = tuple[float, float, float, float]
 ARM = Kinematics()

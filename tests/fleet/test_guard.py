@@ -12,8 +12,8 @@ from monitor import Monitor, Stand, true_joints
 from virtual import virtual
 
 from dobot_async import ArmAlarm, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
+from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Member, ZoneDeadlock, ZoneOccupied
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 BIN = Box((240, 300), (-40, 40), (0, 80))

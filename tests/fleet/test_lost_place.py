@@ -12,8 +12,8 @@ from monitor import Monitor, Stand, Zone, true_joints
 from virtual import virtual
 
 from dobot_async import Fleet, Magician, MotionStopped, MotionUnknown, ReplyTimeout, UltraArm
+from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Member, ZoneDeadlock
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 BIN, ZONE = Box((240, 300), (-40, 40), (0, 80)), Zone((270, 0, 40), (30, 40, 40))

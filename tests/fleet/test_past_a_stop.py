@@ -30,8 +30,8 @@ from dobot_async import (
     UltraArm,
     UltraArmJog,
 )
+from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BarrierBroken, BaseFrame, Box, Cylinder, Member
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate
 
 ALL = os.environ.get("MOMENTS") == "all"

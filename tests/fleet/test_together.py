@@ -13,8 +13,8 @@ from steps import Steps
 from virtual import virtual
 
 from dobot_async import ConnectionLost, DobotError, Fleet, Magician, MotionStopped, MyCobot, UltraArm
+from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import Member
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Faults, Simulation, simulate
 
 LATENCIES = (0.0, 0.002, 0.01, 0.04)

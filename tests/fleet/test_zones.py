@@ -11,10 +11,10 @@ import pytest
 from virtual import virtual
 
 from dobot_async import ArmAlarm, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
+from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Cylinder, Member, ZoneDeadlock, ZoneOccupied
 from dobot_async.fleet.claims import Claim, Party
 from dobot_async.fleet.zones import Zones
-from dobot_async.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 # Two arms that face each other; the bin lies in the middle between them, and each has a tray at its side.

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from dobot_async import Magician, MyCobot, UltraArm
+from dobot_async._core.protocol.transport import Transport
 from dobot_async.simulator import Faults, Simulation, UltraArmQuirks, simulate
-from dobot_async.transports import Transport
 
 __all__ = [
     "BY_NAME",

@@ -12,10 +12,10 @@ from follow_rig import BY_NAME, Family, Rig, each_family, now, rig
 from virtual import virtual
 
 from dobot_async import CommandRejected, MotionStopped, UltraArm, Unreachable
-from dobot_async.magician import commands as magician
-from dobot_async.mycobot import commands as mycobot
+from dobot_async.arms.magician import commands as magician
+from dobot_async.arms.mycobot import commands as mycobot
+from dobot_async.arms.ultraarm import commands as ultraarm
 from dobot_async.simulator import simulate
-from dobot_async.ultraarm import commands as ultraarm
 
 ways = pytest.mark.parametrize("way", ["replace", "clear"])
 

@@ -11,10 +11,10 @@ from follow_rig import BY_NAME, Family, LateLine, Rig, SteppedTask, each_family,
 from virtual import run_virtual, virtual
 
 from dobot_async import ArmAlarm, CommandRejected, ConnectionLost, DobotError, Magician, MotionUnknown
-from dobot_async.magician import commands as magician
-from dobot_async.magician.frame import HEADER
+from dobot_async._core.protocol.transport import Transport
+from dobot_async.arms.magician import commands as magician
+from dobot_async.arms.magician.frame import HEADER
 from dobot_async.simulator import Faults, simulate
-from dobot_async.transports import Transport
 
 MOST_WAITS = 400
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from contextlib import suppress
 
+from dobot_async.arms.mycobot import commands as c
+from dobot_async.arms.mycobot.frame import MAX_LENGTH, Frame, Parser
+from dobot_async.arms.mycobot.models import MODELS
 from dobot_async.errors import ProtocolError
-from dobot_async.mycobot import commands as c
-from dobot_async.mycobot.frame import MAX_LENGTH, Frame, Parser
-from dobot_async.mycobot.models import MODELS
 from dobot_async.simulator import DeviceOptions, MyCobotQuirks, SimulatedMyCobot
 
 __all__ = ["mycobot_arm", "mycobot_parser"]

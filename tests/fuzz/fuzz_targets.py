@@ -12,13 +12,13 @@ from typing import Any
 from fuzz_mycobot import mycobot_arm, mycobot_parser
 from fuzz_ultraarm import ultraarm_answers, ultraarm_arm, ultraarm_gcode
 
+from dobot_async._core.protocol.wire import Layout
+from dobot_async.arms.magician import alarms
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import HEADER, MAX_LENGTH, OVERHEAD, Frame, Parser
 from dobot_async.errors import ProtocolError
-from dobot_async.magician import alarms
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import HEADER, MAX_LENGTH, OVERHEAD, Frame, Parser
 from dobot_async.program import VOCABULARIES
 from dobot_async.simulator import DeviceOptions, Quirks, SimulatedMagician
-from dobot_async.wire import Layout
 
 __all__ = ["TARGETS"]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from contextlib import suppress
 
+from dobot_async.arms.ultraarm import commands as c
+from dobot_async.arms.ultraarm.answers import Answer, Refusal
+from dobot_async.arms.ultraarm.frame import LONGEST, Parser
+from dobot_async.arms.ultraarm.gcode import parse_gcode
 from dobot_async.errors import ProtocolError
 from dobot_async.simulator import DeviceOptions, SimulatedUltraArm, UltraArmQuirks
-from dobot_async.ultraarm import commands as c
-from dobot_async.ultraarm.answers import Answer, Refusal
-from dobot_async.ultraarm.frame import LONGEST, Parser
-from dobot_async.ultraarm.gcode import parse_gcode
 
 __all__ = ["ultraarm_answers", "ultraarm_arm", "ultraarm_gcode"]
 

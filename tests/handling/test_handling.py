@@ -12,10 +12,10 @@ import pytest
 from virtual import virtual
 
 from dobot_async import InfraredPort, Magician, MotionStopped, MyCobot, PTPMode, UltraArm, UnsupportedError
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.mycobot import commands as mycobot
 from dobot_async.grid import Grid
 from dobot_async.handling import PartMissing, PartStuck, gripper_holds, pick, pick_and_place, place
-from dobot_async.magician import commands as c
-from dobot_async.mycobot import commands as mycobot
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.simulator.scene import Block, GripperTool, LightBeam, Mount, Piece, Scene
 

@@ -13,8 +13,8 @@ from typing import Any
 import anyio
 
 from dobot_async._core.link.link import Link
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import FILLER, MAX_LENGTH, OVERHEAD, Frame, Parser, request
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import FILLER, MAX_LENGTH, OVERHEAD, Frame, Parser, request
 
 __all__ = [
     "BARRIERS",

@@ -92,8 +92,8 @@ class Bench:
     def __post_init__(self) -> None:
         self.correlator: Correlator[Reply] = Correlator(self.clock, lambda: self.reorder_window, self.lost.append)
 
-    def ask(self, key: str = "pose", echo: int = 0, *, held: bool = False) -> Request[Reply]:
-        return self.correlator.sent(key, fits(echo), held=held)
+    def ask(self, key: str = "pose", echo: int = 0, *, held: bool = False, proves: bool = True) -> Request[Reply]:
+        return self.correlator.sent(key, fits(echo), held=held, proves=proves)
 
     def hear(self, key: str = "pose", echo: int = 0) -> bool:
         return self.correlator.resolve(Reply(key, echo))
@@ -200,6 +200,15 @@ def test_of_replies_that_are_held_a_single_one_counts_when_something_behind_is_a
     assert stream.hear(BARRIER)
     assert outcomes(held, barrier) == [outcome, Outcome.REPLY]
     assert stream.lost == ([held] if outcome is Outcome.LOST else [])
+
+
+def test_what_takes_its_first_reply_and_proves_nothing_ends_alone(stream: Bench) -> None:
+    other, stop = stream.ask("alarms"), stream.ask(proves=False)
+    stream.hear()
+    assert outcomes(other, stop) == [None, Outcome.REPLY]
+    stream.hear("alarms")
+    assert outcomes(other) == [Outcome.REPLY]
+    assert not stream.lost
 
 
 def test_a_reply_that_is_held_proves_nothing_for_it_may_have_come_alone(stream: Bench) -> None:

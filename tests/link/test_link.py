@@ -34,10 +34,10 @@ from virtual import run_virtual
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
-from dobot_async.contract import LinkState, Unexpected
+from dobot_async._core.protocol.contract import LinkState, Unexpected
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import FILLER, Frame, Parser, request
 from dobot_async.errors import ConnectFailed, ConnectionLost, ProtocolError, ReplyTimeout
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import FILLER, Frame, Parser, request
 from dobot_async.transports.memory import memory_pair
 
 pytestmark = pytest.mark.virtual_time

@@ -11,8 +11,8 @@ from link_line import LATENCY, LOST, TIME, Line, asked, line, now
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.stragglers import AMONG, RARE, SUSPICION, Stragglers
+from dobot_async.arms.magician.frame import Frame
 from dobot_async.errors import ReplyTimeout
-from dobot_async.magician.frame import Frame
 
 pytestmark = pytest.mark.virtual_time
 

@@ -14,8 +14,8 @@ from mcp import Client
 from mcp_types import CallToolResult, TextContent, TextResourceContents
 
 from dobot_async import Magician, Workspace
+from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import Member
-from dobot_async.magician import commands as c
 from dobot_async.mcp_server import ArmServer, make_server
 from dobot_async.remote import Site, Works, open_site
 from dobot_async.simulator import Simulation, simulate

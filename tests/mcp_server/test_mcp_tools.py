@@ -16,14 +16,14 @@ from mcp_types import ImageContent
 from PIL import Image as Picture
 
 from dobot_async import Box, Cylinder, Magician, MyCobot, UltraArm, Workspace
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.mycobot import commands as cobot
+from dobot_async.arms.ultraarm import commands as ultra
 from dobot_async.fleet import Member
 from dobot_async.fleet.cell import parse_cell
-from dobot_async.magician import commands as c
 from dobot_async.mcp_server import make_server
-from dobot_async.mycobot import commands as cobot
 from dobot_async.remote import Works, open_site
 from dobot_async.simulator import simulate
-from dobot_async.ultraarm import commands as ultra
 
 MODES = pytest.mark.parametrize("mode", ["legacy", "auto"])
 MOVING = {"home", "move", "pick", "place", "grip", "draw", "recover", "stop"}

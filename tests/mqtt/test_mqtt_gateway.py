@@ -19,10 +19,10 @@ from bridge_rig import until
 
 from dobot_async import Magician
 from dobot_async._core.util.tasks import cancel_and_join
+from dobot_async.arms.magician import commands as c
 from dobot_async.errors import ConnectFailed
 from dobot_async.fleet import Member
 from dobot_async.fleet.cell import parse_cell
-from dobot_async.magician import commands as c
 from dobot_async.mqtt import Broker, Gateway, broker_at
 from dobot_async.remote import Works, open_site
 from dobot_async.simulator import Simulation, simulate

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from dobot_async.arms.ultraarm import commands as c
+from dobot_async.arms.ultraarm.gcode import parse_gcode
 from dobot_async.program import ProgramError
-from dobot_async.ultraarm import commands as c
-from dobot_async.ultraarm.gcode import parse_gcode
 
 MOVE = (c.MOVE_LINE, c.CoordsMove(200, f=50))
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dobot_async.magician import commands as c
-from dobot_async.mycobot import commands as m
-from dobot_async.mycobot.models import MODELS
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.mycobot import commands as m
+from dobot_async.arms.mycobot.models import MODELS
+from dobot_async.arms.ultraarm import commands as u
 from dobot_async.program import VOCABULARIES, ProgramError, Step
 from dobot_async.program.text import LARGEST, lines_in, parse_number, read_text, shortened
-from dobot_async.ultraarm import commands as u
 
 
 def problems(arm: str, *lines: str, **options: Any) -> tuple[tuple[int, str], ...]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dobot_async import Jog, Magician, MyCobot, UltraArm, UltraArmJog
-from dobot_async.magician import commands as magician
-from dobot_async.mycobot import commands as mycobot
-from dobot_async.ultraarm import commands as ultraarm
+from dobot_async.arms.magician import commands as magician
+from dobot_async.arms.mycobot import commands as mycobot
+from dobot_async.arms.ultraarm import commands as ultraarm
 
 __all__ = ["BY_NAME", "FAMILIES", "Family"]
 

@@ -19,7 +19,8 @@ from typing import Any
 import anyio
 from anyio.lowlevel import checkpoint
 
-from dobot_async.transports import SCHEMES, Transport
+from dobot_async._core.protocol.transport import Transport
+from dobot_async.transports import SCHEMES
 
 TICK = 2e-6  # two timers for one moment fire in any order
 

@@ -18,7 +18,7 @@ from promise_frames import analog_age, count, dated, pose_age, pose_l_age, time_
 from promise_line import Manner
 
 from dobot_async import DobotError
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 
 __all__ = ["KINDS", "QUESTIONS", "Kind", "Tally", "ask_until", "tally_of"]
 

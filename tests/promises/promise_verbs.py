@@ -13,9 +13,9 @@ from typing import Any
 
 from promise_arms import Family
 
-from dobot_async.magician import commands as m
-from dobot_async.mycobot import commands as y
-from dobot_async.ultraarm import commands as u
+from dobot_async.arms.magician import commands as m
+from dobot_async.arms.mycobot import commands as y
+from dobot_async.arms.ultraarm import commands as u
 
 Call = Callable[[Any, Any], Awaitable[Any]]
 """Given the arm, and what was prepared."""

@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 from promise_stale import KINDS, Tally, ask_until, tally_of
 
 from dobot_async import Magician
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
 
 RELAY = Path(__file__).with_name("promise_relay.py")

@@ -64,7 +64,7 @@ async def test_what_a_stalled_line_holds_back_answers_nobody_later(question: Any
 async def test_an_output_that_was_set_meanwhile_is_read_as_it_is() -> None:
     """Stale answers as a user meets them: a level of before the line stood still."""
     async with bench(BY_NAME["magician"]) as b:
-        from dobot_async.magician import commands as c
+        from dobot_async.arms.magician import commands as c
 
         await b.arm.configure_io(5, c.IOFunction.DO)
         await b.arm.set_output(5, False)

@@ -17,7 +17,7 @@ from promise_clock import end_of, now, on_virtual_clock
 from promise_line import Manner
 
 from dobot_async import ArmAlarm, DobotError, Motion, MotionStopped, ReplyTimeout
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 
 pytestmark = pytest.mark.timeout(100)
 MAGICIAN = BY_NAME["magician"]

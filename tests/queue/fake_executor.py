@@ -10,13 +10,13 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.queue.executor import Entry, Source, alarmed
 from dobot_async._core.queue.keeper import Keeper
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import CommandRejected, MotionUnknown, ReplyTimeout
-from dobot_async.wire import Command, Queueing
 
 __all__ = ["ALARM", "GO", "LATENCY", "SET", "FakeExecutor", "Step", "now", "queue_over"]
 

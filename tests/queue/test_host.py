@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from virtual import virtual
 
+from dobot_async._core.protocol.layouts import NOTHING
+from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.queue.executor import Entry
 from dobot_async._core.queue.host import HostExecutor, HostQueue
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import ArmAlarm, CommandRejected, ConnectionLost, MotionStopped, MotionUnknown, ReplyTimeout
-from dobot_async.layouts import NOTHING
-from dobot_async.wire import Command, Queueing
 
 MOVE: Command[Any, None] = Command(
     "Move", 1, NOTHING, NOTHING, "", write=True, queueing=Queueing.ALWAYS, repeatable=False, moves=True

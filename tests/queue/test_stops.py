@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 from virtual import virtual
 
+from dobot_async._core.protocol.layouts import NOTHING
+from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.queue.executor import Entry, Source
 from dobot_async._core.queue.keeper import Keeper
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import ArmAlarm, MotionStopped, MotionUnknown
-from dobot_async.layouts import NOTHING
-from dobot_async.wire import Command, Queueing
 
 MOVE: Command[None, None] = Command(
     "Move", 1, NOTHING, NOTHING, "", write=True, queueing=Queueing.ALWAYS, repeatable=False, moves=True

@@ -13,8 +13,10 @@ import pytest
 from fake_executor import ALARM, GO, SET, FakeExecutor, Step, now, queue_over
 
 from dobot_async import Magician, MyCobot, UltraArm
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue import stream
 from dobot_async._core.queue.motion import Motion
+from dobot_async.arms.magician import commands as c
 from dobot_async.errors import (
     ArmAlarm,
     CommandRejected,
@@ -22,9 +24,7 @@ from dobot_async.errors import (
     DobotError,
     MotionStopped,
 )
-from dobot_async.magician import commands as c
 from dobot_async.simulator import simulate
-from dobot_async.wire import Command
 
 pytestmark = pytest.mark.virtual_time
 

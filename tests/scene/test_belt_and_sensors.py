@@ -8,8 +8,8 @@ import pytest
 from virtual import virtual
 
 from dobot_async import ColorPort, InfraredPort, IOFunction, Magician, MyCobot
-from dobot_async.magician import commands as c
-from dobot_async.mycobot import commands as cobot
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.mycobot import commands as cobot
 from dobot_async.simulator import simulate
 from dobot_async.simulator.scene import Belt, Block, ColorSpot, LightBeam, Mount, Piece, Scene
 

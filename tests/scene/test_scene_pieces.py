@@ -12,9 +12,9 @@ import pytest
 from virtual import virtual
 
 from dobot_async import ArmAlarm, Magician, MyCobot, PTPMode, UltraArm
+from dobot_async.arms.ultraarm import commands as ultra
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.simulator.scene import Block, CupTool, GripperTool, Mount, Piece, Scene, Workpiece
-from dobot_async.ultraarm import commands as ultra
 
 RED = Piece("red", (250, 0), color="red")
 ON_TABLE = -138.0 + 25 + 59.5  # where the arm has to be for the cup to touch the top of a piece on the table

@@ -8,7 +8,7 @@ import pytest
 from virtual import virtual
 
 from dobot_async import Magician, PTPMode, UltraArm
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 from dobot_async.simulator import simulate
 from dobot_async.simulator.scene import Event, Mount, Piece, Scene
 

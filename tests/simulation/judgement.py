@@ -29,9 +29,9 @@ from dobot_async import (
     ReplyTimeout,
 )
 from dobot_async._core.queue.motion import Motion
-from dobot_async.magician import commands as c
+from dobot_async.arms.magician import commands as c
 from dobot_async.simulator import Simulation
-from dobot_async.simulator.work import Executed
+from dobot_async.simulator.device.work import Executed
 
 if TYPE_CHECKING:
     from scenario import Plan

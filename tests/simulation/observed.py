@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Any
 
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame, Parser
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame, Parser
 from dobot_async.simulator import Simulation
 
 __all__ = ["Observed"]

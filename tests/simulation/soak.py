@@ -34,7 +34,7 @@ SCENARIOS = {
     "guards": "scenario_of_guards",
     "stops": "scenario_of_stops",
 }
-FOLDERS = [str(Path(__file__).parents[1] / name) for name in ("simulation", "fleet", "")]
+FOLDERS = [str(Path(__file__).parents[1] / name) for name in ("simulation", "fleet", "support", "")]
 Result = tuple[int, str, dict[str, float]]
 
 

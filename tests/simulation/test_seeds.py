@@ -25,6 +25,7 @@ HARD = {
     710848: "an arm that is switched off and on while the line stays open, with a command under way",
     800859: "an acknowledgement that comes late, when its command is known to be taken, and another one was sent",
     801433: "an arm that was switched off and on once, and not again",
+    6023359: "a stop whose first copy was thought to be lost, and is acknowledged twice",
     153: "a question that waits for its turn, and then for its answer",
 }
 """What once broke a promise, each found in the scenario as it is now."""

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dobot_async.simulator.device import Activity, Device, DeviceOptions, Executed, Fault, Vector, Work
-from dobot_async.simulator.path import joint_leg, travel
-from dobot_async.simulator.profile import Pace
+from dobot_async.simulator.device.device import Activity, Device, DeviceOptions, Executed, Fault, Vector, Work
+from dobot_async.simulator.device.path import joint_leg, travel
+from dobot_async.simulator.device.profile import Pace
 
 PACE = Pace((100.0, 100.0), (200.0, 200.0))
 LITE = DeviceOptions(on_fault="continue")

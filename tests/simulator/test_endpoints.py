@@ -25,9 +25,11 @@ from hypothesis import strategies as st
 from virtual import run_virtual, virtual
 
 from dobot_async import ConnectFailed, IOFunction, Magician
-from dobot_async.simulator import Faults, Simulation, endpoints, simulate
+from dobot_async._core.protocol.transport import Transport
+from dobot_async.simulator import Faults, Simulation, simulate, simulation
 from dobot_async.simulator.faults import Channel
-from dobot_async.transports import Transport, open_transport
+from dobot_async.simulator.url import open_url
+from dobot_async.transports import open_transport
 
 GET_POSE = bytes.fromhex("AAAA020A00F6")
 GET_NAME = bytes.fromhex("AAAA020100FF")
@@ -102,13 +104,13 @@ async def until(condition: Callable[[], object]) -> None:
 def heard(monkeypatch: pytest.MonkeyPatch) -> bytearray:
     """All that reaches simulated arms, before the faults of their lines."""
     arrived = bytearray()
-    send = endpoints.Client.send
+    send = simulation.Client.send
 
-    def noted(client: endpoints.Client, data: bytes) -> None:
+    def noted(client: simulation.Client, data: bytes) -> None:
         arrived.extend(data)
         send(client, data)
 
-    monkeypatch.setattr(endpoints.Client, "send", noted)
+    monkeypatch.setattr(simulation.Client, "send", noted)
     return arrived
 
 
@@ -238,7 +240,7 @@ async def test_a_serial_line_forgets_half_a_frame_after_a_silence(
     async with simulate(listen="pty") as sim, client(sim.url) as transport:
         await transport.send(PTP[:9])
         await until(lambda: heard == PTP[:9])
-        monkeypatch.setattr(endpoints, "SILENCE", 0.0)
+        monkeypatch.setattr(simulation, "SILENCE", 0.0)
         assert await ask(transport) == NAME_REPLY
 
 
@@ -950,11 +952,11 @@ def test_the_seed_of_sim_reaches_the_line() -> None:
 @pytest.mark.parametrize(("url", "homed"), [("sim:", True), ("sim:?homed=true", True), ("sim:?homed=false", False)])
 @virtual
 async def test_sim_is_homed_unless_it_is_told_otherwise(url: str, homed: bool) -> None:
-    transport: Any = await endpoints.open_url(urlsplit(url), arm="magician")
+    transport: Any = await open_url(urlsplit(url), arm="magician")
     assert transport._simulation.arm.homed is homed
     await transport.aclose()
     with pytest.raises(ValueError, match="expected true or false"):
-        await endpoints.open_url(urlsplit("sim:?homed=maybe"), arm="magician")
+        await open_url(urlsplit("sim:?homed=maybe"), arm="magician")
     async with simulate() as sim:
         assert not sim.arm.homed
 

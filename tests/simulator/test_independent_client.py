@@ -22,10 +22,10 @@ from pydobotlab.discovery import identify_magician, is_dobot
 from pydobotlab.protocol import pack_floats, pack_u8, pack_u32, unpack_floats
 from pydobotlab.transport import SerialTransport
 
-from dobot_async.magician import commands as c
+from dobot_async._core.protocol.wire import Command
+from dobot_async.arms.magician import commands as c
 from dobot_async.simulator import Simulation, simulate
-from dobot_async.simulator.work import DeviceOptions, Executed
-from dobot_async.wire import Command
+from dobot_async.simulator.device.work import DeviceOptions, Executed
 
 SPEED = 50.0
 IN_TIME = 20.0

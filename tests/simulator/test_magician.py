@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dobot_async.layouts import NOTHING, Counted, Lenient, Text
-from dobot_async.magician import commands as c
-from dobot_async.magician.alarms import IGNORED
-from dobot_async.magician.frame import MAX_PARAMS, QUEUED, WRITE, Frame, Parser, encode, request
-from dobot_async.magician.kinematics import JointLimits, Kinematics, Unreachable
-from dobot_async.simulator.device import DeviceOptions
-from dobot_async.simulator.magician import MAGICIAN, Quirks, Session, SimulatedMagician
-from dobot_async.simulator.magician_jog import margins
-from dobot_async.wire import Command, Field, Layout, Number, Record
+from dobot_async._core.protocol.layouts import NOTHING, Counted, Lenient, Text
+from dobot_async._core.protocol.wire import Command, Field, Layout, Number, Record
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.alarms import IGNORED
+from dobot_async.arms.magician.frame import MAX_PARAMS, QUEUED, WRITE, Frame, Parser, encode, request
+from dobot_async.arms.magician.kinematics import JointLimits, Kinematics, Unreachable
+from dobot_async.simulator.device.device import DeviceOptions
+from dobot_async.simulator.magician.arm import MAGICIAN, Quirks, Session, SimulatedMagician
+from dobot_async.simulator.magician.jog import margins
 
 Row = Command[Any, Any]
 HOME = (259.104, 0, -8.485, 0)
@@ -1388,7 +1388,7 @@ def test_planning_ends_however_far_the_way_goes_outside_of_the_reach(monkeypatch
 
 
 def test_programs_do_not_grow_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dobot_async.simulator.magician_body.PROGRAM_LINES", 3)
+    monkeypatch.setattr("dobot_async.simulator.magician.body.PROGRAM_LINES", 3)
     bench = Bench()
     bench.ask(c.SET_QUEUED_CMD_START_DOWNLOAD, c.QueuedCmdStartDownload(1, 9))
     for _ in range(3):

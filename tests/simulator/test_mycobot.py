@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mycobot_values import values
 
-from dobot_async.mycobot import commands as c
-from dobot_async.mycobot.frame import Frame, Parser, encode
-from dobot_async.mycobot.models import MODELS
-from dobot_async.mycobot.watch import turned
+from dobot_async._core.protocol.wire import Command
+from dobot_async.arms.mycobot import commands as c
+from dobot_async.arms.mycobot.frame import Frame, Parser, encode
+from dobot_async.arms.mycobot.models import MODELS
+from dobot_async.arms.mycobot.standstill import turned
 from dobot_async.simulator import MyCobotQuirks, SimulatedMyCobot
-from dobot_async.simulator.mycobot_elbow import elbow_angle, turn_elbow
-from dobot_async.simulator.mycobot_kinematics import KINEMATICS, Chain
-from dobot_async.simulator.mycobot_ways import NO_INVERSE, NO_LINE, Ways
-from dobot_async.wire import Command
+from dobot_async.simulator.mycobot.elbow import elbow_angle, turn_elbow
+from dobot_async.simulator.mycobot.kinematics import KINEMATICS, Chain
+from dobot_async.simulator.mycobot.segments import NO_INVERSE, NO_LINE, Ways
 
 
 class Bench:

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from dobot_async.magician.kinematics import JointLimits, Kinematics, Unreachable
-from dobot_async.simulator.curve import Arc, Line, arc, circle
-from dobot_async.simulator.device import Activity, Device, Fault, Vector, Work
-from dobot_async.simulator.path import Leg, curve_leg, joint_leg, jump, travel
-from dobot_async.simulator.profile import Pace, Profile, shared, trapezoid
+from dobot_async.arms.magician.kinematics import JointLimits, Kinematics, Unreachable
+from dobot_async.simulator.device.curve import Arc, Line, arc, circle
+from dobot_async.simulator.device.device import Activity, Device, Fault, Vector, Work
+from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg, jump, travel
+from dobot_async.simulator.device.profile import Pace, Profile, shared, trapezoid
 
 JOINTS = Pace((200.0,) * 4, (400.0,) * 4)
 TOOL = Pace((100.0, 200.0), (400.0, 800.0))

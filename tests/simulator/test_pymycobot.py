@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
-from dobot_async.mycobot import commands as c
+from dobot_async._core.protocol.wire import Command
+from dobot_async.arms.mycobot import commands as c
 from dobot_async.simulator import MyCobotQuirks, SimulatedMyCobot, simulate
-from dobot_async.wire import Command
 
 pymycobot = pytest.importorskip("pymycobot")
 

@@ -18,9 +18,9 @@ from typing import Any
 
 import pytest
 
+from dobot_async._core.protocol.wire import Command
+from dobot_async.arms.ultraarm import commands as c
 from dobot_async.simulator import Simulation, UltraArmQuirks, simulate
-from dobot_async.ultraarm import commands as c
-from dobot_async.wire import Command
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # what it imports beside this is not up to date

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dobot_async.arms.ultraarm import commands as c
+from dobot_async.arms.ultraarm.frame import Parser, encode
 from dobot_async.simulator import DeviceOptions, SimulatedUltraArm, UltraArmQuirks, simulate
-from dobot_async.simulator.ultraarm_body import REACH, forward, inverse
-from dobot_async.simulator.work import Fault
-from dobot_async.ultraarm import commands as c
-from dobot_async.ultraarm.frame import Parser, encode
+from dobot_async.simulator.device.work import Fault
+from dobot_async.simulator.ultraarm.kinematics import REACH, forward, inverse
 
 PLAIN = UltraArmQuirks(acknowledge="ok")
 

@@ -11,8 +11,8 @@ import pytest
 from virtual import virtual
 
 from dobot_async import CommandRejected, Magician, MotionStopped, MyCobot, Pen, UltraArm, UnsupportedError
-from dobot_async.magician import commands as c
-from dobot_async.mycobot import commands as mycobot
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.mycobot import commands as mycobot
 from dobot_async.simulator import simulate
 from dobot_async.simulator.scene import Piece, Scene
 from dobot_async.teaching import (

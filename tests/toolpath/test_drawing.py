@@ -27,9 +27,10 @@ from dobot_async import (
     Unreachable,
     UnsupportedError,
 )
-from dobot_async.magician import commands as m
+from dobot_async.arms.magician import commands as m
+from dobot_async.arms.ultraarm import commands as u
 from dobot_async.simulator import Faults, Simulation, simulate
-from dobot_async.simulator.magician import MAGICIAN
+from dobot_async.simulator.magician.arm import MAGICIAN
 from dobot_async.toolpath import (
     Drawing,
     Progress,
@@ -44,7 +45,6 @@ from dobot_async.toolpath import (
     read_svg,
     write_text,
 )
-from dobot_async.ultraarm import commands as u
 
 PAPER = WorkPlane.flat(195, -45, -50, lift=6)
 TRUE = 0.2  # mm

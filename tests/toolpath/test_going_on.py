@@ -12,10 +12,10 @@ from burner import Burner, ends_of
 from virtual import run_virtual, virtual
 
 from dobot_async import Magician, MotionStopped, UltraArm
-from dobot_async.magician import commands as m
+from dobot_async.arms.magician import commands as m
+from dobot_async.arms.ultraarm import commands as u
 from dobot_async.simulator import Simulation, simulate
 from dobot_async.toolpath import Drawing, Stroke, Toolpath, WorkPlane, estimate
-from dobot_async.ultraarm import commands as u
 
 PLANE = WorkPlane.flat(200, -20, -40)
 WAYS_OUT = ["stop", "arm.stop", "cancel", "timeout", "twice"]

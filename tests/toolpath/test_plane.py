@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dobot_async.arms.magician.commands import Pose
 from dobot_async.calibration import Calibration
 from dobot_async.grid import Grid
-from dobot_async.magician.commands import Pose
 from dobot_async.toolpath import WorkPlane
 
 numbers = st.floats(-200, 200)

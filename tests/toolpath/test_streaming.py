@@ -14,12 +14,12 @@ import pytest
 from virtual import virtual
 
 from dobot_async import Magician
-from dobot_async.magician import commands as m
-from dobot_async.simulator import Simulation, endpoints, simulate
-from dobot_async.simulator.magician import MAGICIAN
-from dobot_async.simulator.work import Executed
+from dobot_async.arms.magician import commands as m
+from dobot_async.endpoints.line_rate import AtBaud
+from dobot_async.simulator import Simulation, memory, simulate
+from dobot_async.simulator.device.work import Executed
+from dobot_async.simulator.magician.arm import MAGICIAN
 from dobot_async.toolpath import Progress, Toolpath, WorkPlane, draw, engrave
-from dobot_async.transports.baud import AtBaud
 
 PLANE = WorkPlane.flat(190, -60, -50)
 BAUD = 115_200
@@ -48,13 +48,13 @@ class SlowLine(AtBaud[Any]):
 @asynccontextmanager
 async def behind_a_slow_line() -> AsyncIterator[tuple[Simulation, Magician]]:
     async with simulate(options=replace(MAGICIAN, keep=None)) as sim:
-        endpoints.running["slow"] = line = SlowLine(sim)  # type: ignore[assignment]
+        memory.running["slow"] = line = SlowLine(sim)  # type: ignore[assignment]
         try:
             async with Magician.connect("sim://slow") as arm:
                 yield sim, arm
                 assert line.faults is sim.faults
         finally:
-            endpoints.running.pop("slow", None)
+            memory.running.pop("slow", None)
 
 
 def halts(records: list[Executed], row: object) -> list[tuple[int, float]]:

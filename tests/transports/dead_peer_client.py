@@ -17,9 +17,9 @@ from contextlib import aclosing
 from typing import Any
 
 from dobot_async._core.link.link import Link
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Parser, request
 from dobot_async.errors import ConnectionLost
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Parser, request
 from dobot_async.transports import open_transport
 
 BEFORE_PROBES_GIVE_UP = 5.7  # seconds

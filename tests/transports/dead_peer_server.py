@@ -1,6 +1,6 @@
 """A program of its own, in a network of its own: echoes on TCP, TLS, WebSocket and both, and tells of who vanishes.
 
-    dead_peer_server.py ADDRESS CERTIFICATE      prints its URLs, then a line for each client of `listen` that has gone
+    dead_peer_server.py ADDRESS CERTIFICATE   prints its URLs, then a line for each client that has gone
 
 Its WebSockets send no pings, so that only the client's own means count.
 """
@@ -20,11 +20,11 @@ from typing import Any
 from websockets.asyncio.server import serve
 from websockets.exceptions import ConnectionClosed
 
-from dobot_async.transports.listen import on_tcp
+from dobot_async.endpoints.listeners import on_tcp
 
 
 class Echo:
-    """A host of `listen`: a client is what sends to it."""
+    """A host of `listeners`: a client is what sends to it."""
 
     def client(self, deliver: Callable[[bytes], None], hang_up: Callable[[], None], **_: Any) -> Any:
         """Somebody has come."""

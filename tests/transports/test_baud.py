@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from virtual import run_virtual, virtual
 
 from dobot_async import Magician
+from dobot_async.endpoints.line_rate import AHEAD, AtBaud, SerialLine, Wired
+from dobot_async.endpoints.pty import on_pty
 from dobot_async.simulator import simulate
 from dobot_async.transports import open_transport
-from dobot_async.transports.baud import AHEAD, AtBaud, SerialLine, Wired
-from dobot_async.transports.terminal import on_pty
 
 BAUD = 115200
 BYTE = 10 / BAUD

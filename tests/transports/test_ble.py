@@ -24,11 +24,12 @@ import anyio
 import pytest
 
 from dobot_async import ConnectFailed, ConnectionLost, Magician, MotionUnknown, PTPMode, SuctionCup
-from dobot_async.contract import LinkState
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame, Parser, encode
+from dobot_async._core.protocol.contract import LinkState
+from dobot_async._core.protocol.transport import Transport
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame, Parser, encode
 from dobot_async.simulator import Simulation, simulate
-from dobot_async.transports import Transport, open_transport
+from dobot_async.transports import open_transport
 
 if sys.platform != "linux":
     pytest.skip("BlueZ is Linux's", allow_module_level=True)
@@ -49,12 +50,16 @@ from dbus_fast import Message
 from dbus_fast.aio import MessageBus
 
 from dobot_async._core.util.tasks import Ended, run_shielded, run_within
-from dobot_async.simulator import bluez
-from dobot_async.simulator.ble_module import Module
-from dobot_async.simulator.ble_names import ADAPTER
-from dobot_async.simulator.ble_rig import Rig, rig
-from dobot_async.simulator.radio import Radio, round_trip
-from dobot_async.transports import ble, ble_advice, ble_claim, ble_scan
+from dobot_async.simulator.ble import bluez
+from dobot_async.simulator.ble.link_layer import Radio, round_trip
+from dobot_async.simulator.ble.module import Module
+from dobot_async.simulator.ble.names import ADAPTER
+from dobot_async.simulator.ble.testbed import Rig, rig
+from dobot_async.transports.ble import diagnostics as ble_advice
+from dobot_async.transports.ble import lock as ble_claim
+from dobot_async.transports.ble import opening
+from dobot_async.transports.ble import scan as ble_scan
+from dobot_async.transports.ble import transport as ble
 
 DAEMON = shutil.which("dbus-daemon")
 if not DAEMON and not os.environ.get("DOBOT_REQUIRE_DBUS"):
@@ -98,8 +103,8 @@ async def module(world: Rig, sim: Simulation) -> Module:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """What waits for an arm that is not there waits less."""
-    monkeypatch.setattr(ble, "SCAN", 0.3)
-    monkeypatch.setattr(ble, "PAUSES", (0.01, 0.01))
+    monkeypatch.setattr(opening, "SCAN", 0.3)
+    monkeypatch.setattr(opening, "PAUSES", (0.01, 0.01))
 
 
 def fast(**details: Any) -> Radio:
@@ -331,7 +336,7 @@ async def test_an_arm_that_another_program_uses_is_left_alone(
 ) -> None:
     async with opened(module.url) as transport:
         if not of_ours:
-            monkeypatch.setattr(ble, "claim", lambda _: ble_claim.Claim(None))
+            monkeypatch.setattr(opening, "claim", lambda _: ble_claim.Claim(None))
 
         with pytest.raises(ConnectFailed, match="else on this computer uses D8:B0:4C:B3:38:68; end it first"):
             await open_transport("ble:", arm="magician")

@@ -20,9 +20,9 @@ from dobot_async.simulator import Simulation, simulate
 if sys.platform != "linux":
     pytest.skip("BlueZ is Linux's", allow_module_level=True)
 
-from dobot_async.simulator.ble_module import Module
-from dobot_async.simulator.ble_rig import Rig, rig
-from dobot_async.simulator.radio import Radio
+from dobot_async.simulator.ble.link_layer import Radio
+from dobot_async.simulator.ble.module import Module
+from dobot_async.simulator.ble.testbed import Rig, rig
 
 if not shutil.which("dbus-daemon") and not os.environ.get("DOBOT_REQUIRE_DBUS"):
     pytest.skip("dbus-daemon is not installed (Debian: apt install dbus-daemon)", allow_module_level=True)

@@ -17,10 +17,10 @@ import pytest
 import trustme
 
 from dobot_async._core.link.link import Link
-from dobot_async.contract import LinkState
+from dobot_async._core.protocol.contract import LinkState
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame, Parser, request
 from dobot_async.errors import ConnectFailed, ConnectionLost, ReplyTimeout
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame, Parser, request
 from dobot_async.transports import open_transport
 
 POSE = c.Pose(*map(float, range(8)))

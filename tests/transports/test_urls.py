@@ -10,8 +10,9 @@ import pytest
 import serial
 
 from dobot_async import ConnectFailed
-from dobot_async.transports import SCHEMES, hidden, open_transport
-from dobot_async.transports.base import number, options
+from dobot_async._core.util.urls import hidden
+from dobot_async.transports import SCHEMES, open_transport
+from dobot_async.transports.options import number, options
 
 NO_TIMES = ("nan", "inf", "-inf", "-1", "-1e-9", "1e400", "", "1,5", "5ms", "1_0", "%201", "\u0661")
 SECONDS = "reorder_window=.*expected seconds, a number from 0 to 10"

@@ -12,7 +12,7 @@ import pytest
 
 from dobot_async import ConnectFailed
 from dobot_async.transports import open_transport
-from dobot_async.transports.zenoh_place import GONE, Place, address
+from dobot_async.transports.zenoh.config import GONE, Place, address
 
 LEASE = "transport/link/tx/lease"
 

@@ -9,10 +9,10 @@ from urllib.parse import urlsplit
 import anyio
 import pytest
 
-from dobot_async.transports import zenoh_messages
-from dobot_async.transports.zenoh import ZenohTransport
-from dobot_async.transports.zenoh_messages import HEADER, Outbox
-from dobot_async.transports.zenoh_place import Place
+from dobot_async.transports.zenoh import messages as zenoh_messages
+from dobot_async.transports.zenoh.config import Place
+from dobot_async.transports.zenoh.messages import HEADER, Outbox
+from dobot_async.transports.zenoh.transport import ZenohTransport
 
 pytest.importorskip("zenoh")
 

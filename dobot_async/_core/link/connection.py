@@ -15,12 +15,12 @@ from typing import TypeVar
 
 import anyio
 
+from dobot_async._core.protocol.contract import LinkState
+from dobot_async._core.protocol.transport import Transport, nowait_writer, read_loop
+from dobot_async._core.util.events import Watched
 from dobot_async._core.util.tasks import cancel_and_join
-from dobot_async.contract import LinkState
+from dobot_async._core.util.urls import hidden
 from dobot_async.errors import ConnectFailed, ConnectionLost
-from dobot_async.events import Watched
-from dobot_async.transports import Transport, hidden
-from dobot_async.transports.base import nowait_writer, read_loop
 
 __all__ = ["Connection", "Reopen"]
 

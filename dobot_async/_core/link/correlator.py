@@ -20,7 +20,8 @@ Rule 2 takes effect that much later there, and a frame within twice that time of
 and answers nobody.
 
 A request may be `held`, for a peer that answers out of order (`stragglers`): its replies are kept, and prove
-nothing, until something behind it is answered. One by then is its own; with none, or several, it is LOST.
+nothing, until something behind it is answered. One by then is its own; with none, or several, it is LOST. One that
+cannot wait for that, a stop, takes its first reply, which `proves` nothing either.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Any, Generic, TypeVar
 
-from dobot_async.contract import Frame
+from dobot_async._core.protocol.contract import Frame
 from dobot_async.errors import ProtocolError
 
 __all__ = ["Correlator", "Outcome", "Request"]
@@ -59,6 +60,7 @@ class Request(Generic[F]):
         sent_at: When it was sent, in seconds.
         held: The replies that are kept; None if it takes the first one.
         expected: Whether the peer always replies to it.
+        proves: Whether its reply shows that what was sent before it will not be answered any more (rule 2).
         outcome: How it ended, None while it is outstanding.
         value: What `accept` made of the reply, or the error that ended the link.
         misfit: Why the last frame of the key was not its reply, if one came.
@@ -72,11 +74,12 @@ class Request(Generic[F]):
     sent_at: float
     held: list[Any] | None = None
     expected: bool = True
+    proves: bool = True
     outcome: Outcome | None = None
     value: Any = None
     misfit: ProtocolError | None = None
     gone_at: float = math.inf
-    wakers: list[Callable[[], None]] = field(default_factory=list)
+    wakers: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
 
     def end(self, outcome: Outcome, value: Any = None) -> None:
         """Give it its outcome, and wake those who wait for that."""
@@ -116,10 +119,17 @@ class Correlator(Generic[F]):
         return len(self._outstanding)
 
     def sent(
-        self, key: Hashable, accept: Callable[[F], Any], *, held: bool = False, expected: bool = True
+        self,
+        key: Hashable,
+        accept: Callable[[F], Any],
+        *,
+        held: bool = False,
+        expected: bool = True,
+        proves: bool = True,
     ) -> Request[F]:
         """Note that a request goes out now."""
-        request = Request(key, accept, next(self._numbers), self._clock(), [] if held else None, expected)
+        kept: list[Any] | None = [] if held else None
+        request = Request(key, accept, next(self._numbers), self._clock(), kept, expected, proves and not held)
         self._outstanding.append(request)
         return request
 
@@ -178,9 +188,11 @@ class Correlator(Generic[F]):
                 if other.sent_at <= request.sent_at - window:
                     other.gone_at = min(other.gone_at, now + window)
                     self._expires_at = min(self._expires_at, other.gone_at)
-        elif request.held is None:  # what is held may have come alone, and proves nothing
+        elif request.proves:
             del self._outstanding[: place + 1]
             self._lose(earlier)
+        elif request.held is None:
+            del self._outstanding[place]
 
         if request.held is None:
             request.end(Outcome.REPLY, value)

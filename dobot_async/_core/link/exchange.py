@@ -23,17 +23,16 @@ from dobot_async._core.link.deadlines import Deadlines, release
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.link.silence import Silence
 from dobot_async._core.link.stragglers import Stragglers
-from dobot_async.contract import Frame, LinkStats
+from dobot_async._core.protocol.contract import Frame, LinkStats
+from dobot_async._core.protocol.transport import Transport
 from dobot_async.errors import ReplyTimeout
-from dobot_async.transports import Transport
 
 __all__ = ["Exchange"]
 
 F = TypeVar("F", bound=Frame)
 logger = logging.getLogger("dobot_async.link")
 TICK = 1e-6  # seconds that count as none
-MOST = 20_000
-"""Outstanding requests with which the link is given up: about an hour of an arm that answers nothing."""
+MOST = 20_000  # outstanding requests with which the link is given up: an hour of an arm that answers nothing
 
 
 class Exchange(Connection, Generic[F]):
@@ -82,6 +81,7 @@ class Exchange(Connection, Generic[F]):
         timeout: float = math.inf,
         held: bool = False,
         expected: bool = True,
+        proves: bool = True,
     ) -> Request[F]:
         """Send a frame once, in its turn; its reply is awaited with `settle`, or by nobody.
 
@@ -91,20 +91,21 @@ class Exchange(Connection, Generic[F]):
             timeout: Seconds for which the transport may be busy.
             held: See `Correlator`.
             expected: False if the arm may well not reply, so that it is no loss.
+            proves: False if its reply may be one that came alone, late (`stragglers`).
 
         Raises:
             ReplyTimeout: The transport did not take it in time.
             ConnectionLost: The link is gone.
         """
         data = self._filler + bytes(frame) if self._silence.is_mute() else bytes(frame)
+        sent = partial(self._sent, frame, accept, held=held, expected=expected, proves=proves)
         if not self._correlator.reorder_window and self._write_now(data):
-            return self._sent(frame, accept, held=held, expected=expected)
+            return sent()
 
         try:
             async with asyncio.timeout(None if timeout == math.inf else timeout):
                 await self.opened()
                 await asyncio.sleep(max(0.0, self._correlator.calm_at(frame.key) - self._loop.time()))
-                sent = partial(self._sent, frame, accept, held=held, expected=expected)
                 return await self._write_in_turn(data, sent)
         except TimeoutError:
             raise ReplyTimeout(f"the line to {self.url} took nothing for {timeout:.3g} s") from None
@@ -127,8 +128,7 @@ class Exchange(Connection, Generic[F]):
         await self._settle(request, self._loop.time() + timeout)
         if request.outcome is Outcome.FAILED:
             self._check()
-
-        if request.outcome is None:
+        elif request.outcome is None:
             raise ReplyTimeout(f"{self.url} has not answered for {timeout:.3g} s")
 
         return request.outcome is Outcome.REPLY
@@ -149,8 +149,7 @@ class Exchange(Connection, Generic[F]):
 
                 ready()
                 self._stats.repeated += request is not None
-                held = self._stragglers.suspected(frame.key, self._loop.time()) and not self._correlator.reorder_window
-                misfit = request.misfit if request else None
+                held, misfit = self._suspected(frame.key), request.misfit if request else None
                 request = await self.send(frame, accept, timeout=left, held=held)
                 request.misfit = misfit
                 if held:
@@ -175,7 +174,7 @@ class Exchange(Connection, Generic[F]):
             behind = self._correlator.newest(frame.key) is not None and not self._correlator.reorder_window
             alive = not copies or self.heard_at >= copies[-1].sent_at
             with suppress(ReplyTimeout):
-                last = await self.send(frame, accept, timeout=left)
+                last = await self.send(frame, accept, timeout=left, proves=not self._suspected(frame.key))
                 copies.append(last)
                 if behind and alive:
                     await self._send_barrier(frame.key, deadline)
@@ -241,9 +240,8 @@ class Exchange(Connection, Generic[F]):
 
     async def _wait(self, until: float, *requests: Request[F]) -> None:
         """Return when one of several requests has ended, or at a time."""
-        for request in requests:
-            if request.outcome:
-                return
+        if any(request.outcome for request in requests):
+            return
 
         ended = self._loop.create_future()
         wake = partial(release, ended)
@@ -259,11 +257,8 @@ class Exchange(Connection, Generic[F]):
                 if request.outcome is None:
                     request.wakers.remove(wake)
 
-        for request in requests:
-            if request.outcome:
-                return
-
-        self._resync()
+        if not any(request.outcome for request in requests):
+            self._resync()
 
     def _left(self, deadline: float) -> float:
         """The seconds until a deadline, 0 if it is over; the loop's timers may fire a moment early."""
@@ -290,7 +285,11 @@ class Exchange(Connection, Generic[F]):
         self.heard_at = self._loop.time()
         self._silence.heard()
 
-    def _sent(self, frame: F, accept: Callable[[F], Any], *, held: bool = False, expected: bool = True) -> Request[F]:
+    def _suspected(self, key: Hashable) -> bool:
+        """Whether a reply of a key may come alone, long after its turn; of datagrams any may."""
+        return not self._correlator.reorder_window and self._stragglers.suspected(key, self._loop.time())
+
+    def _sent(self, frame: F, accept: Callable[[F], Any], **flags: bool) -> Request[F]:
         """Take note of a frame that goes out, in the order in which the arm gets it."""
         if len(self._correlator) >= MOST:
             self._end(TimeoutError(f"the arm has not answered the last {MOST} requests"))
@@ -298,7 +297,7 @@ class Exchange(Connection, Generic[F]):
 
         self._stragglers.sent()
         self._note(True, frame)
-        return self._correlator.sent(frame.key, accept, held=held, expected=expected)
+        return self._correlator.sent(frame.key, accept, **flags)
 
     def _lost_on_the_way(self, request: Request[F]) -> None:
         """Take note of a request that will not be answered in its turn."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import AsyncIterator, Callable, Hashable, Sequence
+from collections.abc import AsyncGenerator, Callable, Hashable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from typing import Any, TypeVar
 
@@ -22,13 +22,13 @@ from dobot_async._core.link.connection import Reopen
 from dobot_async._core.link.correlator import Outcome
 from dobot_async._core.link.exchange import Exchange
 from dobot_async._core.link.round_trip import RoundTrip
+from dobot_async._core.protocol.contract import Encoder, Frame, LinkState, LinkStats, Parser, Unexpected
+from dobot_async._core.protocol.transport import Transport
+from dobot_async._core.protocol.wire import Command
+from dobot_async._core.util.events import Events
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
-from dobot_async.contract import Encoder, Frame, LinkState, LinkStats, Parser, Unexpected
 from dobot_async.errors import ConnectionLost, ProtocolError, ReplyTimeout
-from dobot_async.events import Events
-from dobot_async.transports import Transport
-from dobot_async.wire import Command
 
 __all__ = ["Link"]
 
@@ -212,7 +212,7 @@ class Link(Exchange[F]):
         await super().aclose()
 
     @asynccontextmanager
-    async def _only(self, what: str, deadline: float) -> AsyncIterator[None]:
+    async def _only(self, what: str, deadline: float) -> AsyncGenerator[None]:
         """While this is entered, a queued command is out, and nothing else."""
         await self._acquire(None, Priority.QUEUED, deadline, what)
         try:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from typing import Any, TypeVar
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import MotionStopped
-from dobot_async.wire import Command
 
 __all__ = ["BatchBuilder", "batch"]
 
@@ -40,7 +40,7 @@ class BatchBuilder:
 
 
 @asynccontextmanager
-async def batch(queue: MotionQueue, builder: B, timeout: float | None) -> AsyncIterator[B]:
+async def batch(queue: MotionQueue, builder: B, timeout: float | None) -> AsyncGenerator[B]:
     """Queue what the block collects, with nothing between it, when the block ends; an error or a stop sends none."""
     timeout, epoch = check_timeout(timeout), queue.epoch
     try:

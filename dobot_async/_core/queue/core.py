@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter, deque
-from collections.abc import Coroutine, Iterator, Sequence
+from collections.abc import Coroutine, Generator, Sequence
 from contextlib import AbstractAsyncContextManager, AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TypeVar
 
@@ -142,7 +142,7 @@ class QueueCore:
         return nullcontext()
 
     @contextmanager
-    def led_by(self, motion: Motion) -> Iterator[None]:
+    def led_by(self, motion: Motion) -> Generator[None]:
         """While this is entered a motion that is not queued has the arm: what is put is refused, and a stop ends it.
 
         Raises:
@@ -267,7 +267,7 @@ class QueueCore:
         return [motion for motion in self._pending if motion.moves and not motion.ended][:1]
 
     @contextmanager
-    def _unless_stopped(self) -> Iterator[None]:
+    def _unless_stopped(self) -> Generator[None]:
         """What goes wrong in this block is of no interest if a stop has begun meanwhile."""
         stops = self._stopper.count
         try:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
 from dobot_async.errors import ArmAlarm, DobotError, MotionUnknown, ReplyTimeout
-from dobot_async.wire import Command
 
 if TYPE_CHECKING:
     from dobot_async._core.queue.keeper import Keeper
@@ -33,9 +33,11 @@ class Source(Protocol):
 
     def __len__(self) -> int:
         """How many wait to be sent."""
+        ...
 
     def take(self) -> Entry:
         """Return the next one, which is sent now; it can no longer be withdrawn."""
+        ...
 
     def put_back(self, entries: Sequence[Entry]) -> None:
         """The arm is known not to have taken these: they come next again."""
@@ -58,6 +60,7 @@ class Executor(Protocol):
     @property
     def keeper(self) -> Keeper[Any] | None:
         """What looks at the ways of motions before they are sent; None for an arm that may go anywhere."""
+        ...
 
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
         """Return an entry for the queue.
@@ -66,6 +69,7 @@ class Executor(Protocol):
             ValueError: The parameters do not fit, the target cannot be reached, or the command cannot be queued.
             TypeError: They are of the wrong type.
         """
+        ...
 
     async def submit(self, source: Source) -> None:
         """Give commands to the arm, each exactly once and in order, until the source is empty; wait for room.
@@ -84,15 +88,19 @@ class Executor(Protocol):
             MotionUnknown: The arm was switched off and on.
             ReplyTimeout: The arm is silent.
         """
+        ...
 
     async def earliest_end(self, entry: Entry) -> float | None:
         """Return seconds within which a command, the next one to be finished, cannot be; None where nothing tells."""
+        ...
 
     async def alarms(self) -> Sequence[object]:
         """Return the alarms that keep the arm from moving."""
+        ...
 
     async def is_at_target(self, entry: Entry) -> bool:
         """Return whether the arm stands where a motion leads; False where the motion alone cannot tell."""
+        ...
 
     async def stop(self) -> None:
         """Stop the arm where it is, ahead of everything; repeated until the arm has heard it."""

@@ -16,13 +16,13 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any, Protocol, TypeVar
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.executor import Entry, Source, unseen
 from dobot_async._core.queue.keeper import Keeper
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup, cancel_and_join
 from dobot_async.errors import ConnectionLost, DobotError, MotionUnknown, another
-from dobot_async.wire import Command
 
 __all__ = ["HostExecutor", "HostQueue", "MotionRunner"]
 
@@ -36,6 +36,7 @@ class MotionRunner(Protocol):
 
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
         """Return a checked entry; see `Executor.prepare`."""
+        ...
 
     async def run(self, entry: Entry) -> None:
         """Do one command, sent once, and return when it is done.

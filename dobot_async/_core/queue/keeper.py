@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from dobot_async._core.queue.executor import Entry
@@ -63,7 +63,7 @@ class Keeper(ABC, Generic[P]):
 
         last = self._last(before())
         start = self._ends[last] if last else await self.look()
-        ends = []
+        ends: list[tuple[Motion, Any]] = []
         for motion in motions:
             if self.concerns(motion.entry):
                 start = await self.follow(motion.entry, start)

@@ -23,6 +23,7 @@ class Watcher(Protocol):
 
     def watching(self) -> AbstractContextManager[None]:
         """While this is entered, the arm is asked how far it is."""
+        ...
 
     def count(self, error: DobotError | None) -> None:
         """Take note of how something ended that moves the arm."""

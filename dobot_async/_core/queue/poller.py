@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from typing import Protocol
 
@@ -36,16 +36,19 @@ class Watched(Protocol):
     @property
     def pending(self) -> int:
         """How many accepted commands are not known to have ended."""
+        ...
 
     @property
     def next(self) -> object:
         """The Motion that ends next, None if there is none."""
+        ...
 
     async def look(self, *, alarms: bool, index: bool = True) -> None:
         """Ask the arm how far it is, and end the Motions that this decides."""
 
     async def rest(self) -> float | None:
         """Return seconds within which no Motion can end; None where nothing tells."""
+        ...
 
     def give_up(self, error: DobotError) -> None:
         """End everything because of an error that nobody can mend."""
@@ -69,7 +72,7 @@ class StatusPoller:
             self._task = asyncio.create_task(self._poll(), name="dobot_async poller")
 
     @contextmanager
-    def watching(self, after: float = 0.0) -> Iterator[None]:
+    def watching(self, after: float = 0.0) -> Generator[None]:
         """Ask while this is entered, once so many seconds have passed."""
         self._watchers += 1
         timer = asyncio.get_running_loop().call_later(after, self.watch)

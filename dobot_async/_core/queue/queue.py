@@ -18,6 +18,7 @@ import logging
 from collections.abc import Coroutine, Sequence
 from typing import Any, TypeVar, overload
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.core import QueueCore
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.executor import Entry
@@ -32,7 +33,6 @@ from dobot_async.errors import (
     ReplyTimeout,
     another,
 )
-from dobot_async.wire import Command
 
 __all__ = ["MotionQueue"]
 

@@ -17,11 +17,11 @@ from collections.abc import AsyncIterable, AsyncIterator, Coroutine, Generator, 
 from contextlib import AbstractContextManager, suppress
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
+from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.errors import ArmAlarm, DobotError
-from dobot_async.wire import Command
 
 __all__ = ["Steps", "Stream", "StreamStep"]
 
@@ -42,10 +42,12 @@ class StreamStep(Protocol):
     @property
     def command(self) -> Command[Any, Any]:
         """The row."""
+        ...
 
     @property
     def value(self) -> Any:
         """Its parameters."""
+        ...
 
 
 class Queue(Protocol):
@@ -54,12 +56,15 @@ class Queue(Protocol):
     @property
     def epoch(self) -> Epoch:
         """The time since the last stop."""
+        ...
 
     async def put(self, command: Command[Any, Any], value: Any, *, epoch: Epoch | None = None) -> Motion:
         """Give one command to the arm's queue and return once the arm has accepted it."""
+        ...
 
     def watching(self) -> AbstractContextManager[None]:
         """While this is entered, the arm is asked how far it is."""
+        ...
 
 
 class Queued(NamedTuple):
@@ -146,7 +151,9 @@ class Feeder:
                 is_verb = isinstance(step, Coroutine)
                 self._putting = (name_of(step, number), step)
                 await self._acquire(step)
-                motion = await (step if is_verb else self._queue.put(step.command, step.value, epoch=self._epoch))
+                motion: object = await (
+                    step if is_verb else self._queue.put(step.command, step.value, epoch=self._epoch)
+                )
                 if not isinstance(motion, Motion):
                     raise TypeError("a step is a verb of the queue, such as arm.queue.home(), or has command and value")
 

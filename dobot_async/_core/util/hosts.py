@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ipaddress
 from collections.abc import Collection
+from contextlib import suppress
 from urllib.parse import urlsplit
 
 __all__ = ["HostAndPort", "host_and_port", "is_for_us", "is_loopback"]
@@ -54,13 +55,10 @@ def host_and_port(text: str) -> HostAndPort:
     Args:
         text: Such as 127.0.0.1:9464, or [::1]:0 for a port that is free.
     """
-    try:
+    with suppress(ValueError):
         place = urlsplit(f"//{text}")
         host, port = place.hostname, place.port
-    except ValueError:
-        host = port = None
+        if host and port is not None and not (place.path or place.query or place.fragment or "@" in text):
+            return host, port
 
-    if not host or port is None or place.path or place.query or place.fragment or "@" in text:
-        raise ValueError(f"expected HOST:PORT, such as 127.0.0.1:9464, not {text!r}")
-
-    return host, port
+    raise ValueError(f"expected HOST:PORT, such as 127.0.0.1:9464, not {text!r}")

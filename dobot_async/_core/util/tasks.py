@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncGenerator, Callable, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any, TypeVar
 
@@ -205,7 +205,7 @@ class Cleanup:
         return failure
 
     @asynccontextmanager
-    async def at_end(self, work: Callable[[], Coroutine[Any, Any, Any]], what: str) -> AsyncIterator[None]:
+    async def at_end(self, work: Callable[[], Coroutine[Any, Any, Any]], what: str) -> AsyncGenerator[None]:
         """Do something when the block ends, however it ends.
 
         Raises:

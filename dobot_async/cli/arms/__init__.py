@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import click
 
+from dobot_async.arms.registry import Parts
 from dobot_async.cli.family import Family
-from dobot_async.families import Parts
 
 __all__ = ["FAMILIES", "chosen"]
 

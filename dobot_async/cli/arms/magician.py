@@ -6,13 +6,13 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.alarms import Alarm
+from dobot_async.arms.magician.arm import Jog, Magician
+from dobot_async.arms.magician.params import Pose
+from dobot_async.arms.magician.vocabulary import MODES
 from dobot_async.cli.arms.magician_frames import described, pieces
 from dobot_async.cli.family import Family, Told
-from dobot_async.magician import commands as c
-from dobot_async.magician.alarms import Alarm
-from dobot_async.magician.arm import Jog, Magician
-from dobot_async.magician.params import Pose
-from dobot_async.magician.vocabulary import MODES
 
 __all__ = ["MAGICIAN", "joint_words", "tool_words"]
 

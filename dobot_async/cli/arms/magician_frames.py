@@ -12,13 +12,13 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from dobot_async._core.protocol.wire import Command, Number, u64
+from dobot_async.arms.magician import alarms
+from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame, Parser
 from dobot_async.cli.output import plain
 from dobot_async.cli.trace import MASK, REPLY, REQUEST
 from dobot_async.errors import ProtocolError
-from dobot_async.magician import alarms
-from dobot_async.magician import commands as c
-from dobot_async.magician.frame import Frame, Parser
-from dobot_async.wire import Command, Number, u64
 
 __all__ = ["described", "pieces"]
 

@@ -10,16 +10,16 @@ from typing import Any
 
 import click
 
+from dobot_async.arms.mycobot import commands as c
+from dobot_async.arms.mycobot.alarms import CobotAlarm
+from dobot_async.arms.mycobot.arm import MyCobot
+from dobot_async.arms.mycobot.frame import Frame, Parser
+from dobot_async.arms.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
+from dobot_async.arms.mycobot.pose import CobotPose
 from dobot_async.cli.family import Family, Pieces, Told
 from dobot_async.cli.output import plain
 from dobot_async.cli.trace import REPLY, REQUEST
 from dobot_async.errors import ProtocolError
-from dobot_async.mycobot import commands as c
-from dobot_async.mycobot.alarms import CobotAlarm
-from dobot_async.mycobot.arm import MyCobot
-from dobot_async.mycobot.frame import Frame, Parser
-from dobot_async.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
-from dobot_async.mycobot.pose import CobotPose
 
 __all__ = ["COBOTS"]
 

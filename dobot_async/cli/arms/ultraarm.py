@@ -12,14 +12,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from dobot_async.arms.ultraarm import commands as c
+from dobot_async.arms.ultraarm.arm import UltraArm, UltraArmJog
+from dobot_async.arms.ultraarm.frame import Frame, errors, split_words
+from dobot_async.arms.ultraarm.params import UltraArmAngles, UltraArmCoords
 from dobot_async.cli.family import Family, Told
 from dobot_async.cli.output import plain
 from dobot_async.cli.trace import REPLY, REQUEST
 from dobot_async.errors import ProtocolError
-from dobot_async.ultraarm import commands as c
-from dobot_async.ultraarm.arm import UltraArm, UltraArmJog
-from dobot_async.ultraarm.frame import Frame, errors, split_words
-from dobot_async.ultraarm.params import UltraArmAngles, UltraArmCoords
 
 __all__ = ["ULTRAARM"]
 

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from dobot_async.families import Parts
+from dobot_async.arms.registry import Parts
 from dobot_async.simulator.scene.geometry import Place3, Placement
 from dobot_async.simulator.scene.seat import Event, SceneArm, Seat
 from dobot_async.simulator.scene.stock import ABOVE_ALL, RunningBelt, Stock, Workpiece
@@ -208,7 +208,7 @@ class Scene:
         self.advance(self._clock())
 
     @contextmanager
-    def still(self) -> Iterator[None]:
+    def still(self) -> Generator[None]:
         """Brings everything up to the clock, and lets no time pass within a block: all that is read there fits."""
         self.refresh()
         busy, self._busy = self._busy, True

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from dobot_async.simulator.device import Device
+from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.scene.geometry import Place3, Placement
 from dobot_async.simulator.scene.stock import RunningBelt, Standing, Stock, Workpiece
 from dobot_async.simulator.scene.things import ColorSpot, CupTool, GripperTool, LightBeam, Mount, PenTool, Tool
@@ -45,46 +45,57 @@ class SceneArm(Protocol):
     @property
     def arm(self) -> Any:
         """The simulated arm itself."""
+        ...
 
     @property
     def device(self) -> Device:
         """Its device."""
+        ...
 
     @property
     def due(self) -> float:
         """When the next thing happens by itself: a command ends, or a tool follows one; infinity if nothing does."""
+        ...
 
     @property
     def moving(self) -> bool:
         """Whether anything of it moves, its gripper included."""
+        ...
 
     @property
     def rail(self) -> float:
         """Where it stands on its rail, mm; 0 without one."""
+        ...
 
     @property
     def sucks(self) -> bool:
         """Whether its pump makes a cup suck."""
+        ...
 
     @property
     def opening(self) -> float:
         """How far its gripper is open, 0 to 1."""
+        ...
 
     @property
     def switches(self) -> Any:
         """How its sensors are switched; when that changes, it is told again what they see."""
+        ...
 
     def tip(self, tool: Tool) -> Placement:
         """Returns where the tip of a tool is now, in the arm's own coordinates."""
+        ...
 
     def crash(self) -> None:
         """Ends what moves, as what the arm has run into does, with the alarm that this kind of arm has for it."""
 
     def pulses(self, motor: int) -> int:
         """Returns how many pulses a stepper has made; raises ValueError if the arm has no such stepper."""
+        ...
 
     def turns(self, motor: int) -> bool:
         """Returns whether a stepper turns."""
+        ...
 
     def sees(self, sensor: LightBeam, seen: bool) -> None:
         """Tells it what a light beam sees; raises ValueError if it cannot have one."""

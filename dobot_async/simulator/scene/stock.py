@@ -27,10 +27,12 @@ class Carrier(Protocol):
     @property
     def name(self) -> str:
         """What it is called."""
+        ...
 
     @property
     def placement(self) -> Placement:
         """Where it is now."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from dobot_async.magician.params import AccessoryVersion, ColorPort, InfraredPort
+from dobot_async.arms.magician.params import AccessoryVersion, ColorPort, InfraredPort
 from dobot_async.simulator.scene.geometry import Place3
 
 __all__ = [

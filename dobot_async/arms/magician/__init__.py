@@ -1,0 +1,1 @@
+"""The Dobot Magician: commands, alarms, kinematics, and the arm itself."""

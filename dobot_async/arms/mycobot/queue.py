@@ -1,0 +1,60 @@
+"""The queue of a myCobot with the verbs on it, and its batches. It is on this side: see `_core.queue.host`."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine
+from contextlib import AbstractAsyncContextManager
+from typing import Any, TypeVar
+
+from dobot_async._core.protocol.wire import Command
+from dobot_async._core.queue.batch import BatchBuilder, batch
+from dobot_async._core.queue.host import HostExecutor, HostQueue
+from dobot_async._core.queue.motion import Motion
+from dobot_async._core.queue.queue import MotionQueue
+from dobot_async.arms.mycobot.models import CobotModel
+from dobot_async.arms.mycobot.verbs import Verbs
+
+__all__ = ["CobotBatch", "CobotQueue"]
+
+Q = TypeVar("Q")
+
+
+class CobotQueue(HostQueue, Verbs[Coroutine[Any, Any, Motion]]):
+    """What is put here the arm is given one after the other; each verb returns a Motion."""
+
+    def __init__(self, executor: HostExecutor, model: CobotModel) -> None:
+        super().__init__(executor)
+        self._model = model
+
+    @property
+    def model(self) -> CobotModel:
+        """What the arm is."""
+        return self._model
+
+    def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, Motion]:
+        """Queue a command; see `put`."""
+        return self.put(command, value, timeout=timeout)
+
+    def batch(self, *, timeout: float | None = None) -> AbstractAsyncContextManager[CobotBatch]:
+        """Collect commands, and queue them with nothing between them when the block ends; an error sends none.
+
+        Args:
+            timeout: Seconds to wait for room in the queue.
+
+        Raises:
+            DobotError: As `put`; what was accepted before that is pending.
+        """
+        return batch(self, CobotBatch(self, self._model), timeout)
+
+
+class CobotBatch(BatchBuilder, Verbs[Motion]):
+    """Commands that are queued together; each verb returns its Motion, to be awaited after the batch's block."""
+
+    def __init__(self, queue: MotionQueue, model: CobotModel) -> None:
+        super().__init__(queue)
+        self._model = model
+
+    @property
+    def model(self) -> CobotModel:
+        """What the arm is."""
+        return self._model

@@ -1,0 +1,1 @@
+"""What each family's arm is in a scene."""

@@ -1,0 +1,1 @@
+"""Eclipse Zenoh: the transport, its session, its messages and its configuration."""
