@@ -1,8 +1,14 @@
 # make demo      a pick-and-place cycle on the built-in simulator, over a real pseudo-terminal
+# make panel     a simulated arm in the browser: make panel [ARM_URL=sim:] [OPTIONS="--port 0"]
 # make test      ruff, mypy and the whole test suite
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
+# make docs      the site, in build/site, and what is promised of it; a warning is an error
+# make dist      sdist and wheel, in dist, as the package index will take them
+# make sbom      what the wheel brings with it, in build/sbom.cdx.json (CycloneDX)
 # make format    what ruff can mend
+# make sync      writes the blocking classes out of the asynchronous ones again
+# make lerobot   the contract tests of integrations/, with LeRobot but without what only its training needs
 # make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|stops]
 # make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
@@ -11,10 +17,16 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all test-minimum check pytest format clean fuzz promises soak
+.PHONY: demo panel sync lerobot test test-all test-minimum check pytest docs dist sbom format clean fuzz promises soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
+
+ARM_URL ?= sim:
+OPTIONS ?=
+
+panel: $(VENV)/.panel
+	$(BIN)/python -m dobot_async --url '$(ARM_URL)' panel $(OPTIONS)
 
 test: check pytest
 
@@ -23,6 +35,9 @@ check: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+sync: $(VENV)/.dev
+	$(BIN)/python tests/sync/write_sync.py
 
 format: $(VENV)/.dev
 	$(BIN)/ruff check --fix .
@@ -52,12 +67,41 @@ test-minimum: .venv-minimum/.dev
 pytest: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto
 
+docs: $(VENV)/.dev
+	rm -rf build/site
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html -d build/doctrees docs build/site
+	DOBOT_SITE=build/site DOBOT_REQUIRE_SITE=1 $(BIN)/python -m pytest -q tests/docs/test_site.py
+
+dist: $(VENV)/.dev
+	rm -rf dist
+	$(BIN)/python -m build
+	$(BIN)/python -m twine check --strict dist/*
+
+EXTRAS := ble-sim,bridge,cli,draw,pytest,zenoh
+
+sbom: dist
+	$(PYTHON) -m venv --clear build/sbom
+	build/sbom/bin/python -m pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[$(EXTRAS)]"
+	$(BIN)/cyclonedx-py environment --pyproject pyproject.toml --output-file build/sbom.cdx.json build/sbom
+
 SEEDS ?= 10000
 FIRST ?= 0
 OF ?= arm
 
 soak: $(VENV)/.dev
 	$(BIN)/python tests/simulation/soak.py --of $(OF) --seeds $(SEEDS) --first $(FIRST)
+
+LEROBOT := 'lerobot>=0.4.4,<0.5'
+LEROBOT_NEEDS := 'draccus==0.10.0' 'deepdiff>=7.0.1,<9' 'huggingface-hub>=0.34.2,<0.36' 'jsonlines>=4' 'numpy>=2' termcolor tqdm
+
+lerobot: .venv-lerobot/.lerobot
+	DOBOT_REQUIRE_LEROBOT=1 .venv-lerobot/bin/python -m pytest tests/test_integrations.py
+
+.venv-lerobot/.lerobot: pyproject.toml
+	$(PYTHON) -m venv .venv-lerobot
+	.venv-lerobot/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]' $(LEROBOT_NEEDS)
+	.venv-lerobot/bin/python -m pip install --quiet --disable-pip-version-check --no-deps $(LEROBOT)
+	touch $@
 
 ANSWERS ?= 200000
 
@@ -81,9 +125,13 @@ $(VENV)/.cli: $(VENV)/.venv pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[cli]'
 	touch $@
 
+$(VENV)/.panel: $(VENV)/.venv pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[cli,panel]'
+	touch $@ $(VENV)/.cli
+
 $(VENV)/.dev: $(VENV)/.venv pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	touch $@ $(VENV)/.cli
+	touch $@ $(VENV)/.cli $(VENV)/.panel
 
 clean:
 	rm -rf .venv .venv-minimum .venv-3.* build dist *.egg-info .import_linter_cache .mypy_cache .pytest_cache .ruff_cache .hypothesis

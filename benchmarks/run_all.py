@@ -28,7 +28,20 @@ RESULTS = HERE / "RESULTS.md"
 DOCS = HERE.parent / "docs"
 FLOW = (7.0, 3.6)
 COLORS = ("#8a8a8a", "#1f6fb4", "#d1852c", "#6b9b37")
-NAMES = ("parser", "roundtrip", "queue", "completion", "lateness", "fleet", "many", "families", "stream", "ble")
+NAMES = (
+    "parser",
+    "roundtrip",
+    "queue",
+    "completion",
+    "lateness",
+    "fleet",
+    "many",
+    "families",
+    "stream",
+    "sync",
+    "ble",
+    "panel",
+)
 
 
 def ran(name: str, *, quick: bool) -> dict[str, Any] | None:

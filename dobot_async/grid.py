@@ -1,8 +1,8 @@
 """A pallet: places in rows, columns and layers, between corners that the arm was taught. Pure arithmetic, mm.
 
-third o---.---.---o fourth       rows go from the first corner to the third
-      |           |              columns go from the first corner to the second
-first o---.---.---o second       layers lie on one another
+    third o---.---.---o fourth       rows go from the first corner to the third
+          |           |              columns go from the first corner to the second
+    first o---.---.---o second       layers lie on one another
 
 A row's places are evenly far apart, and so are a column's.
 """

@@ -196,6 +196,14 @@ def check_mqtt_session(output: str) -> None:
     assert outcomes == ["refused (Refused)", "done", "done", "refused (Unreachable)", "done"]
 
 
+def check_sync_pick_and_place(output: str) -> None:
+    assert [numbers(line) for line in output.splitlines()] == [[1], [2], [3]]
+
+
+def check_sync_two_arms(output: str) -> None:
+    assert [numbers(line) for line in output.splitlines()] == [[200], [200]]
+
+
 CHECKS: dict[str, Callable[[str], None]] = {
     "connect_and_read.py": check_connect_and_read,
     "pick_and_place.py": check_pick_and_place,
@@ -220,6 +228,8 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "palletise.py": check_palletise,
     "mcp_session.py": check_mcp_session,
     "mqtt_session.py": check_mqtt_session,
+    "sync_pick_and_place.py": check_sync_pick_and_place,
+    "sync_two_arms.py": check_sync_two_arms,
 }
 
 

@@ -1,4 +1,4 @@
-"""README.md and docs/: their Python runs, and what they refer to is there.
+"""README.md, CONTRIBUTING.md, SECURITY.md and docs/: their Python runs, and what they refer to is there.
 
 The blocks of a page run in their order and share their names. A block that awaits outside of a function runs as the
 body of `async with Magician.connect("sim:?speed=20") as arm:`, as the pages say; any other is a program as it stands.
@@ -21,7 +21,10 @@ from dobot_async.arms.registry import REGISTERED
 from dobot_async.transports import SCHEMES
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 BLOCK = re.compile(r"^```(\w*)(.*)\n((?:.*\n)*?)```$", re.MULTILINE)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)

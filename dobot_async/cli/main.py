@@ -57,6 +57,7 @@ COMMANDS = {
     "teleop": ("dobot_async.cli.commands.teleop:teleop", "Lead the arm by keys, or by targets from a pipe."),
     "teach": ("dobot_async.cli.commands.teach:teach", "Teach the arm, and keep that in a file."),
     "wifi": ("dobot_async.cli.commands.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
+    "panel": ("dobot_async.cli.commands.panel:panel", "Show arms in the browser, and move them there."),
 }
 """Where each command is, and what the help says of it."""
 

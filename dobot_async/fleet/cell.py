@@ -8,6 +8,7 @@ group = "loading"
 guard = "wait"                               # or "raise", "off"
 clearance = 20
 limits = { x = [100, 300], z = [0, 200] }    # in the cell
+rail = 90                                    # in which direction l grows, in degrees to the left of the arm's x axis
 options = { check_reach = true }             # of `connect`
 
 [zones.bin]
@@ -43,7 +44,7 @@ from dobot_async.transports import SCHEMES
 
 __all__ = ["Cell", "parse_cell", "read_cell"]
 
-ARM_KEYS = ("url", "family", "model", "base", "group", "guard", "clearance", "limits", "options")
+ARM_KEYS = ("url", "family", "model", "base", "group", "guard", "clearance", "limits", "rail", "options")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +125,7 @@ def member(table: Mapping[str, Any]) -> Member[AnyArm]:
         guard=cast(Any, text(table, "guard", "off")),
         clearance=number(table, "clearance", 0.0),
         limits=at("limits", box, limits) if limits else None,
+        rail=number(table, "rail") if "rail" in table else None,
     )
 
 

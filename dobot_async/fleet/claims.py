@@ -9,7 +9,8 @@ No I/O and no clock: each claim is told its answer by a call.
 A claim is for one or several zones, all of which it gets at once. Claims on the same zone are granted in the order of
 their requests. There is one exception: a claim passes an earlier one that waits, directly or not, for the party that
 asks, for that one would otherwise wait for itself. A cycle of waits that is left is a deadlock, and who closes it is
-told so. An arm that still moves may yet leave a zone by itself; whether it does shows when it stands.
+told so. An arm that still moves may yet leave a zone by itself; whether it does shows when it stands. So all claims are
+judged anew when an arm comes to rest, as when something is released, also if it does not tell where it stands.
 """
 
 from __future__ import annotations
@@ -33,11 +34,13 @@ class Party:
     Attributes:
         name: For messages.
         failure: Why it will not leave what it holds; None while all is well.
+        inside: The zones that it is known to be in, whoever else holds them: it may go on in them.
         moving: Tells whether it may leave what it holds without being told to.
     """
 
     name: str
     failure: DobotError | None = None
+    inside: frozenset[str] = frozenset()
     moving: Callable[[], bool] = field(default=lambda: False)
 
 
@@ -184,7 +187,7 @@ class Claims:
         self._end(lambda _: True, error)
 
     def settle(self) -> None:
-        """Answers all that can be answered; to be called when a party has failed."""
+        """Answers all that can be answered; to be called when a party has failed or come to rest."""
         while True:
             found = next((claim for claim in self._waiting if self._free(claim) and self._next(claim)), None)
             if found:
@@ -212,11 +215,13 @@ class Claims:
         self.settle()
 
     def _foreign(self, claim: Claim) -> Iterator[tuple[Party, str]]:
-        """Who stands in the way of a claim, and in which zone; who is in a zone may move in it, even beside others."""
-        inside = frozenset[str]().union(*(each.zones for each in self._held if each.party is claim.party))
+        """Who stands in the way of a claim, and in which zone; who is in a zone may move in it, even beside others.
+
+        To hold it is not enough: who only may be in a zone, beside another one who only may be there, could meet it.
+        """
         for each in self._held:
             if each.party not in claim.own:
-                for zone in sorted(each.zones & claim.zones - inside):
+                for zone in sorted(each.zones & claim.zones - claim.party.inside):
                     yield each.party, zone
 
     def _free(self, claim: Claim) -> bool:

@@ -148,6 +148,15 @@ class Fleet(Crew[A]):
 
         return arm
 
+    def member(self, name: str) -> Member[A]:
+        """Returns what the fleet was told of an arm before it was connected."""
+        return self._seat(name).member
+
+    @property
+    def zones(self) -> Mapping[str, Shape | None]:
+        """Where each zone is, by name; None for one that is nowhere in particular."""
+        return dict(self._zones.shapes)
+
     def base(self, name: str) -> BaseFrame:
         """Returns where an arm stands in the cell."""
         return self._seat(name).member.base

@@ -11,6 +11,8 @@
    hand.
 5. An arm that was switched off and on does not know where it is: it may be anywhere in its reach, and each of its ways
    may lead anywhere there, until it was homed.
+6. Whatever ends, a step, a jog or a look, all claims are judged anew: an arm that does not tell where it stands keeps
+   what it holds, and yet it rests. It is asked again until it tells.
 
 What is looked at is the tool's place; `clearance` is for what is around it.
 """
@@ -89,7 +91,6 @@ class Guard(Generic[S]):
         self._claims: list[Claim] = []
         self._stance: S | None = None  # after all steps
         self._standing: frozenset[str] = frozenset()
-        self._inside: frozenset[str] = frozenset()  # those of them that it was really in when it was looked at last
         self._located = False
         self._loose: list[frozenset[str]] = []  # where the arm may be by what is no step: jogs, leftovers, changes
         self._mute = False  # whether it did not tell where it is when it was asked last
@@ -143,6 +144,8 @@ class Guard(Generic[S]):
         self._steps.extend(course.steps)
         for step in course.steps:
             step.homing = self._planner.begun(step.motion.entry.value)
+            if step.motion.moves:
+                self._party.inside &= step.after or frozenset()
 
         if course.moves:
             self._plans += 1
@@ -233,23 +236,22 @@ class Guard(Generic[S]):
     async def catch_up(self) -> None:
         """Take note of all that is known to have ended: what it held may be what is asked for next."""
         self._doubt()
-        with suppress(DobotError):
+        try:
             while self._steps and self._steps[0].motion.ended:
-                step = self._steps[0]
-                if step.motion.exception():
-                    await self.lost()
+                if self._steps[0].motion.exception():
+                    self._forget()
                 else:
-                    await self.done(step)
+                    self._done(self._steps.popleft())
 
-            if not (self._located or self._busy or (self._mute and self._party.failure)):
+            if self.is_sought:
                 await self.locate()
+        except DobotError:
+            pass  # it does not tell, and keeps what it holds until it does
+        finally:
+            self._settle()
 
-    async def done(self, step: Step) -> None:
-        """Take note that a step is done."""
-        if step not in self._steps:
-            return
-
-        self._steps.remove(step)
+    def _done(self, step: Step) -> None:
+        """Take note that the first step is done."""
         if step.homing is not None:
             self._planner.homed(step.homing)
 
@@ -259,21 +261,10 @@ class Guard(Generic[S]):
             self._standing |= step.zones
             self._located = False
 
-        if not (self._located or self._busy):
-            await self.locate()
-
-        self._settle()
-
     def unsure(self) -> None:
         """Take note that the arm is stopped, somewhere on its way."""
         self._located, self._stance = False, None
         self._plans += 1
-
-    async def lost(self) -> None:
-        """Take note that the first step has failed: the arm may be anywhere on the way of those that have."""
-        self._forget()
-        if not self._busy:
-            await self.locate()
 
     async def locate(self) -> None:
         """Find out where the arm stands once it does; raise DobotError if it does not tell."""
@@ -284,24 +275,17 @@ class Guard(Generic[S]):
             await self._queue.stops_heard()
             await self._rest()
             stance = await self._planner.look()
+            self._mute = False
+            if plans == self._plans and not self._loose:
+                self._stands(stance)
         finally:
             self._looking -= 1
-
-        self._mute = False
-        if plans == self._plans and not self._loose:
-            self._planner.settled(stance)
-            self._located = True
-            if self._planner.astray:
-                self._stance = None
-                self._standing |= self._anywhere()
-                self._inside &= self.holds  # another one may be where it was looked at last
-            else:
-                region, self._stance = stance.region, stance
-                self._standing = self._zones_of(region)
-                inside = region.zones(self._zones, self._base, ROUNDING)
-                self._inside = inside if region.known else frozenset()
-
             self._settle()
+
+    @property
+    def is_sought(self) -> bool:
+        """Whether the arm rests somewhere that it is still to be asked about. One that has failed is asked once."""
+        return not (self._located or self._busy or (self._mute and self._party.failure))
 
     async def watch_limits(self) -> str:
         """Return why a jog has to end: the tool is about to leave the limits."""
@@ -374,6 +358,20 @@ class Guard(Generic[S]):
 
             before = now
 
+    def _stands(self, stance: S) -> None:
+        """Take note of where the arm stands, with nothing to do."""
+        self._planner.settled(stance)
+        self._located = True
+        if self._planner.astray:
+            self._stance = None
+            self._standing |= self._anywhere()
+            self._party.inside &= self.holds  # another one may be where it was looked at last
+        else:
+            region, self._stance = stance.region, stance
+            self._standing = self._zones_of(region)
+            inside = region.zones(self._zones, self._base, ROUNDING)
+            self._party.inside = inside if region.known else frozenset()
+
     def _forget(self) -> None:
         """Drop steps that have failed; the arm may be anywhere on their way."""
         while self._steps and self._steps[0].motion.ended:
@@ -395,7 +393,7 @@ class Guard(Generic[S]):
         ahead = frozenset[str]().union(*self._loose, *(step.zones for step in self._steps))
         others = (claim.zones for claim in self._zones.claims.held if claim.party is not self._party)
         needed = ahead | self._standing
-        missing = (ahead | self._inside & self._standing | self._standing.difference(*others)) - self.holds
+        missing = (ahead | self._party.inside & self._standing | self._standing.difference(*others)) - self.holds
         if missing:
             claim = Claim(self._party, frozenset([self._party]), missing)
             self._claims.append(claim)

@@ -30,6 +30,7 @@ from dobot_async.fleet.zones import Zones, here
 __all__ = ["Member", "Seat", "tell_to_stop"]
 
 
+BETWEEN_LOOKS = 1.0  # seconds until an arm that did not tell where it stands is asked again
 recovering: ContextVar[Seat | None] = ContextVar("recovering", default=None)
 """The arm that is made ready again here: what that takes, such as power, passes though the arm is stopped."""
 
@@ -79,6 +80,7 @@ class Seat:
         self._quiet = False
         self._tasks: set[asyncio.Task[None]] = set()
         self._follower: asyncio.Task[None] | None = None
+        self._seeker: asyncio.Task[None] | None = None
 
     @property
     def connected(self) -> bool:
@@ -119,7 +121,7 @@ class Seat:
             )
             if options.get("queue") == "keep" and self.commands:
                 await guard.glimpse()
-                self._spawn(guard.until(lambda: self.family.leftovers(arm)), "leftovers")
+                self._spawn(self._leave_behind(guard, arm), "leftovers")
             else:
                 await guard.locate()
 
@@ -275,6 +277,9 @@ class Seat:
         if self._steps and not self._quiet and (self._follower is None or self._follower.done()):
             self._follower = self._spawn(self._follow(), "follower")
 
+        if self._guard and self._guard.is_sought and (self._seeker is None or self._seeker.done()):
+            self._seeker = self._spawn(self._seek(self._guard), "seeker")
+
     async def take_turn(self, deadline: float | None) -> None:
         """Takes the lock of the order: nobody else commands the arm until `end_turn`.
 
@@ -296,6 +301,7 @@ class Seat:
 
     def end_turn(self) -> None:
         """Lets others command the arm, and watches to its end what it was told."""
+        self._commanding = ()  # from now on, although the next one goes on only when the loop lets it
         self._order.release()
         self.follow()
 
@@ -352,6 +358,19 @@ class Seat:
                 await self._guard.catch_up()
             elif step in self._steps:
                 self._steps.remove(step)
+
+        self.follow()
+
+    async def _seek(self, guard: Guard[Any]) -> None:
+        """Asks where the arm stands until it tells: what it holds until then, others may wait for."""
+        while guard.is_sought:
+            await guard.catch_up()
+            await asyncio.sleep(BETWEEN_LOOKS)
+
+    async def _leave_behind(self, guard: Guard[Any], arm: Arm) -> None:
+        """Waits for the end of what an earlier program has left in the arm's queue."""
+        await guard.until(lambda: self.family.leftovers(arm))
+        self.follow()
 
     def _spawn(self, work: Any, what: str) -> asyncio.Task[None]:
         """Starts a task that ends with the seat."""

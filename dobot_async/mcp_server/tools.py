@@ -139,18 +139,8 @@ def add_motion_tools(server: MCPServer[None], works: Works) -> None:
         """Put down what the tool holds: from above the place straight down, let go, and straight up again."""
         return await do(ctx, arm, Place(x=x, y=y, z=z, tool=tool, approach=approach, speed=speed))
 
-    @server.tool(annotations=MOVES)
-    async def grip(
-        ctx: Ctx,
-        hold: Annotated[Flag, Field(description="true to hold, false to let go: what is held falls")],
-        tool: Hand = "suction",
-        arm: Arm = None,
-    ) -> Told:
-        """Let the tool hold, or let go, where it is."""
-        return await do(ctx, arm, Grip(hold=hold, tool=tool))
-
     add_drawing(server, works)
-    add_ends(server, works)
+    add_standing(server, works)
 
 
 def add_drawing(server: MCPServer[None], works: Works) -> None:
@@ -191,9 +181,19 @@ def add_drawing(server: MCPServer[None], works: Works) -> None:
         return await do(ctx, arm, action)
 
 
-def add_ends(server: MCPServer[None], works: Works) -> None:
-    """Add what ends something: a motion, or the alarms."""
+def add_standing(server: MCPServer[None], works: Works) -> None:
+    """Add what does not move the tool: its grip, and what ends alarms and motions."""
     do = doing(works)
+
+    @server.tool(annotations=MOVES)
+    async def grip(
+        ctx: Ctx,
+        hold: Annotated[Flag, Field(description="true to hold, false to let go: what is held falls")],
+        tool: Hand = "suction",
+        arm: Arm = None,
+    ) -> Told:
+        """Let the tool hold, or let go, where it is."""
+        return await do(ctx, arm, Grip(hold=hold, tool=tool))
 
     @server.tool(annotations=AGAIN)
     async def recover(ctx: Ctx, arm: Arm = None) -> Told:

@@ -188,7 +188,11 @@ async def on_ble(simulation: Simulation, stack: AsyncExitStack, **details: Any) 
     if sys.platform != "linux":
         raise ValueError("ble is simulated by a BlueZ of its own, which only Linux can have")
 
-    from dobot_async.simulator.ble import testbed as ble_rig  # noqa: PLC0415 - other systems have no D-Bus
+    try:
+        from dobot_async.simulator.ble import testbed as ble_rig  # noqa: PLC0415 - other systems have no D-Bus
+    except ImportError as error:
+        message = f"{error.name} is not installed, and simulated BLE needs it: pip install 'dobot-async[ble-sim]'"
+        raise ImportError(message, name=error.name) from error
 
     return await ble_rig.serve(simulation, stack, **details)
 

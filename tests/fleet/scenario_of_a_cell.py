@@ -2,8 +2,9 @@
 
     make soak OF=cell [SEEDS=10000] [FIRST=0]     runs many of them
 
-What must hold in each run: no two tools are ever in one zone, nobody hangs, no zone is held for ever, all arms stand
-still soon after one has failed, as soon as their lines carry a stop to them, and a call whose time is over ends.
+What must hold in each run: no two tools are ever in one zone, nobody hangs, nobody is left to wait who could go on or
+never will (`waits.py`), no zone is held for ever, all arms stand still soon after one has failed, as soon as their
+lines carry a stop to them, and a call whose time is over ends.
 
 In some runs lines stand still or fall silent, for times that no clock of the driver bounds.
 """
@@ -19,6 +20,7 @@ from random import Random
 from typing import Any
 
 import async_solipsism
+import waits
 
 from dobot_async import ConnectionLost, DobotError, Fleet, Magician, PTPMode
 from dobot_async._core.util.shapes import Shape
@@ -82,8 +84,8 @@ class Run:
 
     async def play(self) -> None:
         """Runs all programs under the eyes of an observer."""
-        watching = asyncio.create_task(self.observe())
-        striking = asyncio.create_task(self.strike())
+        work = (self.observe(), self.strike(), waits.watch(self.fleet._zones.claims))
+        watching = [asyncio.create_task(each) for each in work]
         try:
             async with asyncio.timeout(LONG):
                 with suppress(DobotError):
@@ -91,13 +93,7 @@ class Run:
         except TimeoutError:
             raise Violation(f"somebody hangs; held: {self.held()}") from None
         finally:
-            for task in (watching, striking):
-                task.cancel()
-
-            await asyncio.wait([watching, striking])
-
-        if not watching.cancelled():
-            watching.result()
+            await waits.end(watching)
 
         if self.fleet.failures:
             loop = asyncio.get_running_loop()

@@ -3,7 +3,8 @@
     make soak OF=guards [SEEDS=10000] [FIRST=0]      runs many of them
 
 Arms come with something left in their queues, change their tools at once and in the queue, ride on rails, jog, home,
-jump, raise alarms, are stopped, and are switched off and on. What must hold: no two tools are ever in one zone.
+jump, raise alarms, are stopped, and are switched off and on. What must hold: no two tools are ever in one zone, and
+nobody is left to wait who could go on or never will (`waits.py`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any, Literal
 
+import waits
 from monitor import Monitor, Stand, Violation, Zone, true_joints
 from virtual import run_virtual
 
@@ -333,11 +335,12 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
             members[name] = Member(sim.url, Magician, options, base, "alone", mode, rail=stand.rail)
 
         monitor = Monitor(sims, stands, {name: seen for name, (seen, _) in zones.items()})
-        watching = asyncio.create_task(monitor.watch())
+        watching = [asyncio.create_task(monitor.watch())]
         shapes = {name: shape for name, (_, shape) in zones.items()}
         connecting = Fleet.connect(members, zones=shapes, groups={"alone": "alone"})
         try:
             fleet = await stack.enter_async_context(connecting)
+            watching.append(asyncio.create_task(waits.watch(fleet._zones.claims)))
             cell = Cell(random, sims, fleet, monitor, say)
             steps = random.randint(4, 12)
             work = fleet.run({name: cell.program(name, Random(random.random()), steps) for name in names})
@@ -349,10 +352,7 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
         except TimeoutError:
             raise Violation(f"somebody hangs; held: {[(zone, fleet.holders(zone)) for zone in zones]}") from None
         finally:
-            watching.cancel()
-            await asyncio.wait([watching])
-            if not watching.cancelled():
-                watching.result()
+            await waits.end(watching)
 
         return Figures(loop.time(), cell.told, cell.done, monitor.seen, cell.failures)
 

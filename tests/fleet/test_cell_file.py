@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 from virtual import virtual
 
-from dobot_async import Fleet, Magician, MyCobot, UltraArm
+from dobot_async import Fleet, Magician, MyCobot, ReplyTimeout, UltraArm
 from dobot_async.fleet import BaseFrame, Box, Cylinder
 from dobot_async.fleet.cell import parse_cell, read_cell
 
@@ -18,6 +20,7 @@ url = "sim:?speed=20"
 guard = "wait"
 clearance = 20
 limits = { x = [100, 300] }
+rail = -90
 options = { check_reach = true }
 
 [arms.right]
@@ -49,6 +52,7 @@ def test_all_that_a_file_may_say() -> None:
     left, right, third = cell.members.values()
     assert (left.kind, right.kind, third.kind) == (Magician, MyCobot, UltraArm)
     assert (left.guard, left.clearance, left.limits) == ("wait", 20, Box(x=(100, 300)))
+    assert [each.rail for each in cell.members.values()] == [-90, None, None]
     assert left.options == {"check_reach": True}
     assert right.options == {"model": "myarm300"}
     assert right.base == BaseFrame(500, 0, 0, 180)
@@ -77,6 +81,9 @@ ARM = '[arms.a]\nurl = "sim:"\n'
         (f"{ARM}guard = 'maybe'", r"arms\.a: expected guard"),
         (f"{ARM}clearance = -1", r"arms\.a: expected guard .* clearance >= 0"),
         (f"{ARM}clearance = true", r"arms\.a: clearance: expected a number, not True"),
+        (f"{ARM}rail = {{}}", r"arms\.a: rail: expected a number, not {}"),
+        (f"{ARM}rail = inf", r"arms\.a: rail is the direction of a Magician's rail in degrees, not inf"),
+        (f"{ARM}family = 'ultraarm'\nrail = 90", r"arms\.a: rail is the direction of a Magician's rail"),
         (f"{ARM}base = 1", r"arms\.a: base: expected a table"),
         (f"{ARM}base = {{ roll = 1 }}", r"arms\.a: base: a base has no 'roll'"),
         (f"{ARM}base = {{ x = nan }}", r"arms\.a: base: a base frame has finite numbers"),
@@ -142,6 +149,43 @@ def test_every_family_has_its_reply_timeout(family: str) -> None:
 
     with pytest.raises(ValueError, match="reply_timeout"):
         parse_cell(f"{cell}options = {{ reply_timeout = 0 }}")
+
+
+def test_a_guarded_arm_of_a_file_rides_on_its_rail_and_keeps_out_of_zones(tmp_path: Path) -> None:
+    """From x = 0 to x = 300 the tool that stands out to y = 200 comes into the bin."""
+    path = tmp_path / "cell.toml"
+    path.write_text(
+        """
+        [arms.a]
+        url = "sim:?speed=20"
+        guard = "raise"
+        base = { yaw = 90 }
+        rail = -90
+
+        [zones.bin]
+        box = { x = [250, 350], y = [150, 250], z = [0, 80] }
+        """,
+        encoding="utf-8",
+    )
+
+    async def enter(fleet: Fleet[Any]) -> None:
+        """Enters the bin as a task that is not the arm's."""
+        async with fleet.zone("bin", timeout=1):
+            pass
+
+    @virtual
+    async def scene() -> None:
+        async with Fleet.from_file(path) as fleet:
+            arm = fleet.arm("a", Magician)
+            await arm.set_rail()
+            await arm.home()
+            await arm.move_to(200, 0, 40, l=0)
+            await asyncio.create_task(enter(fleet))
+            await arm.move_to(200, 0, 40, l=300)
+            with pytest.raises(ReplyTimeout, match="did not get zone bin"):
+                await asyncio.create_task(enter(fleet))
+
+    scene()
 
 
 def test_a_byte_order_mark_is_none_of_the_text(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from virtual import virtual
 from dobot_async import ArmAlarm, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
 from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Member, ZoneDeadlock, ZoneOccupied
-from dobot_async.simulator import Simulation, simulate
+from dobot_async.simulator import Faults, Simulation, simulate
 
 BIN = Box((240, 300), (-40, 40), (0, 80))
 LIMITS = Box((150, 300), (-60, 60), (0, 150))
@@ -78,6 +78,30 @@ async def test_an_arm_with_leftovers_may_go_anywhere_until_they_are_done() -> No
             await moving
             assert inside(sb)
             assert [each.command for each in sa.arm.executed].count(c.SET_PTP_CMD) == 2, "all of it was done"
+
+
+@virtual
+async def test_who_may_be_in_a_zone_does_not_move_there_beside_another_who_may() -> None:
+    async with simulate(speed=5, homed=True, faults=Faults(latency=0.1)) as sa, simulate(speed=5, homed=True) as sb:
+        sa.arm.guide_to(*OUT)
+        sb.arm.guide_to(*ASIDE)
+        await left_behind(sa)
+        members = {
+            "a": Member(sa.url, Magician, {"queue": "keep"}, guard="wait"),
+            "b": Member(sb.url, Magician, guard="wait", rail=90),  # it was not told of its rail, and so may be anywhere
+        }
+        async with Fleet.connect(members, zones={"bin": BIN}) as fleet:
+            assert fleet.holders("bin") == ["b", "a"]
+            moving = asyncio.create_task(fleet["b"].move_to(*IN))
+            seen = 0
+            while not moving.done():
+                seen += inside(sa)
+                assert not (inside(sa) and inside(sb))
+                await asyncio.sleep(0.01)
+
+            await moving
+            assert seen
+            assert inside(sb)
 
 
 @virtual

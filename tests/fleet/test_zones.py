@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from typing import Any, Literal
 
 import pytest
 from virtual import virtual
 
-from dobot_async import ArmAlarm, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
+from dobot_async import ArmAlarm, DobotError, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
 from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Cylinder, Member, ZoneDeadlock, ZoneOccupied
 from dobot_async.fleet.claims import Claim, Party
@@ -588,3 +588,83 @@ def test_members_are_checked() -> None:
 
     with pytest.raises(ValueError, match="limits are kept by the guard"):
         Member("sim:", Magician, limits=Box(x=(0, 1)))
+
+
+@virtual
+async def test_an_arm_that_does_not_tell_where_it_stands_is_waited_for_no_more() -> None:
+    async with facing() as (fleet, sims):
+        told: list[DobotError] = []
+        ended = asyncio.Event()
+
+        async def left() -> None:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(0.2):
+                    await fleet["left"].move_to(*IN)
+
+            try:
+                async with fleet.zone("belt"):
+                    pass
+            except DobotError as error:
+                told.append(error)
+                ended.set()
+
+        async def right() -> None:
+            async with fleet.zone("belt"):
+                await asyncio.sleep(0.1)
+                sims["left"].faults.loss = 1.0
+                try:
+                    async with fleet.zone("bin"):
+                        pass
+                except DobotError as error:
+                    told.append(error)
+                    ended.set()
+
+        async def other() -> None:
+            """Has the arm looked at when the last claim is judged, and for longer than that takes."""
+            await asyncio.sleep(4)
+            with suppress(DobotError):
+                await fleet["left"].move_to(*BEHIND)
+
+            await ended.wait()  # for the end of a program has all claims judged
+
+        async with asyncio.timeout(60):
+            await fleet.run({"left": left(), "right": right(), "other": other()})
+
+        assert isinstance(told[0], ZoneDeadlock)
+        sims["left"].faults.loss = 0.0
+
+
+@virtual
+async def test_who_has_had_its_turn_is_not_waited_for_any_more() -> None:
+    async with facing() as (fleet, sims):
+
+        async def program() -> None:
+            await fleet["left"].queue.move_to(*ASIDE)
+            await fleet.barrier("meet")
+
+        await fleet.run({"left": program(), "other": program()})
+        await fleet["left"].queue.join()
+        assert moved(sims["left"]) == 2
+
+
+@virtual
+async def test_an_arm_that_did_not_tell_where_it_stands_is_asked_until_it_does() -> None:
+    async with facing() as (fleet, sims):
+        loop = asyncio.get_running_loop()
+
+        async def left() -> None:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(0.2):
+                    await fleet["left"].move_to(*ASIDE)  # through the bin, which its arm leaves while nobody hears it
+
+            await asyncio.sleep(60)
+
+        async def right() -> float:
+            await asyncio.sleep(0.1)
+            sims["left"].faults.loss = 1.0
+            async with fleet.zone("bin"):
+                return loop.time()
+
+        loop.call_later(20, setattr, sims["left"].faults, "loss", 0.0)
+        told = await fleet.run({"left": left(), "right": right()})
+        assert 20 < (told["right"] or 0) < 30

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from scenario import run_seed
-from soak import replay
+from soak import replay, scenario
 
 SEEDS = 60
 BLOCK = 10
@@ -30,6 +30,12 @@ HARD = {
 }
 """What once broke a promise, each found in the scenario as it is now."""
 
+HARD_CELLS = {
+    ("cell", 900895): "an arm that comes to rest and does not tell where, while all wait and nothing else happens",
+    ("guards", 50159): "an arm that may be anywhere along its rail, and one with leftovers in its queue",
+}
+"""The same of the scenarios of several arms."""
+
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
 @pytest.mark.parametrize("first", range(0, SEEDS, BLOCK))
@@ -46,6 +52,12 @@ def test_seeds(first: int) -> None:
 @pytest.mark.parametrize("seed", HARD, ids=HARD.get)
 def test_seeds_that_once_broke_a_promise(seed: int) -> None:
     run_seed(seed)
+
+
+@pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
+@pytest.mark.parametrize(("of", "seed"), HARD_CELLS, ids=HARD_CELLS.values())
+def test_cells_that_once_broke_a_promise(of: str, seed: int) -> None:
+    scenario(of).run_seed(seed)
 
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")

@@ -73,7 +73,7 @@ GET_DEVICE_VERSION = read("GetDeviceVersion", 2, DeviceVersion, "2.3.3")
 SET_DEVICE_WITH_L = write("SetDeviceWithL", 3, Lenient(Record(DeviceWithL), least=1), "V1.1", ALLOWED)
 GET_DEVICE_WITH_L = read("GetDeviceWithL", 3, FLAG, "V1.1")
 GET_DEVICE_TIME = read("GetDeviceTime", 4, U32, "V1.1")  # milliseconds since power-up
-GET_DEVICE_ID = read("GetDeviceID", 5, Number[tuple[int, int, int]](u32x3), "V1.1.4")
+GET_DEVICE_ID = read("GetDeviceID", 5, Number[tuple[int, int, int]](u32x3), "V1.1.4")  # in three parts
 GET_DEVICE_INFO = read("GetDeviceInfo", 6, DeviceInfo, "V1.1.5")
 
 # 2.4 Pose
@@ -92,7 +92,7 @@ SET_HOME_PARAMS = write("SetHOMEParams", 30, HOMEParams, "2.6.1", ALLOWED)
 GET_HOME_PARAMS = read("GetHOMEParams", 30, HOMEParams, "2.6.1")
 SET_HOME_CMD = motion("SetHOMECmd", 31, Lenient(Record(HOMECmd), least=0), "2.6.2")
 SET_AUTO_LEVELING_CMD = motion("SetAutoLevelingCmd", 32, AutoLevelingCmd, "V1.1")
-GET_AUTO_LEVELING_RESULT = read("GetAutoLevelingResult", 32, F32, "V1.1")
+GET_AUTO_LEVELING_RESULT = read("GetAutoLevelingResult", 32, F32, "V1.1")  # unit not known
 
 # 2.7 Handhold teaching
 SET_HHT_TRIG_MODE = write("SetHHTTrigMode", 40, HHT_TRIG_MODE, "2.7.1")
@@ -187,8 +187,8 @@ SET_ANGLE_SENSOR_STATIC_ERROR = write("SetAngleSensorStaticError", 140, AngleSen
 GET_ANGLE_SENSOR_STATIC_ERROR = read("GetAngleSensorStaticError", 140, AngleSensorStaticError, "2.17.1")
 SET_ANGLE_SENSOR_COEF = write("SetAngleSensorCoef", 141, AngleSensorCoef, "V1.1", timeout=FLASH)
 GET_ANGLE_SENSOR_COEF = read("GetAngleSensorCoef", 141, AngleSensorCoef, "V1.1")
-SET_BASE_DECODER_STATIC_ERROR = write("SetBaseDecoderStaticError", 142, F32, "V1.1", timeout=FLASH)
-GET_BASE_DECODER_STATIC_ERROR = read("GetBaseDecoderStaticError", 142, F32, "V1.1")
+SET_BASE_DECODER_STATIC_ERROR = write("SetBaseDecoderStaticError", 142, F32, "V1.1", timeout=FLASH)  # unit not known
+GET_BASE_DECODER_STATIC_ERROR = read("GetBaseDecoderStaticError", 142, F32, "V1.1")  # unit not known
 
 # 2.18 Wi-Fi
 SET_WIFI_CONFIG_MODE = write("SetWIFIConfigMode", 150, FLAG, "2.18.1", timeout=FLASH)
@@ -227,8 +227,8 @@ SET_QUEUED_CMD_START_DOWNLOAD = write(
 )
 SET_QUEUED_CMD_STOP_DOWNLOAD = write("SetQueuedCmdStopDownload", 244, NOTHING, "2.19.5", timeout=FLASH)
 SET_QUEUED_CMD_CLEAR = write("SetQueuedCmdClear", 245, NOTHING, "2.19.6")
-GET_QUEUED_CMD_CURRENT_INDEX = read("GetQueuedCmdCurrentIndex", 246, Number[int](u64), "2.19.7")
-GET_QUEUED_CMD_LEFT_SPACE = read("GetQueuedCmdLeftSpace", 247, Count(), "2.19.8")
+GET_QUEUED_CMD_CURRENT_INDEX = read("GetQueuedCmdCurrentIndex", 246, Number[int](u64), "2.19.7")  # the last one done
+GET_QUEUED_CMD_LEFT_SPACE = read("GetQueuedCmdLeftSpace", 247, Count(), "2.19.8")  # commands for which there is room
 GET_QUEUED_CMD_MOTION_FINISH = read("GetQueuedCmdMotionFinish", 248, FLAG, "V1.1.5")
 
 # The order of the module is the order of the table.

@@ -157,6 +157,7 @@ class Numbers(Bracket[T]):
 
     def __init__(self, keyword: str, kind: type[T], convert: Callable[[str], Any] = float) -> None:
         assert is_dataclass(kind)
+        self.kind = kind
         names = [each.name for each in fields(kind)]
 
         def read(texts: list[str]) -> T:

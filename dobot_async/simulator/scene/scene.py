@@ -95,6 +95,21 @@ class Scene:
         return MappingProxyType(self._stock.pieces)
 
     @property
+    def fixtures(self) -> tuple[Block | Belt, ...]:
+        """The blocks and belts, each `at` with its height."""
+        return self._stock.fixtures
+
+    @property
+    def sensors(self) -> tuple[LightBeam | ColorSpot, ...]:
+        """The light beams and colour sensors."""
+        return self._sensors
+
+    @property
+    def table(self) -> float:
+        """How high the table is, mm."""
+        return self._stock.table.solid.top
+
+    @property
     def events(self) -> tuple[Event, ...]:
         """What has happened so far, in order: picked, dropped, crash, off the belt; the last 10,000."""
         self.refresh()

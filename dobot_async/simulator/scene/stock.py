@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from dobot_async.simulator.scene.geometry import Place3, Placement, Solid
@@ -168,14 +168,20 @@ class Stock:
 
     Attributes:
         table: Where everything ends that falls beside all else.
+        fixtures: The blocks and belts, each with the height at which it stands.
         belts: The belts.
         pieces: The pieces, by name.
     """
 
     def __init__(self, table: float, blocks: Iterable[Block], belts: Iterable[Belt]) -> None:
         self.table = Standing("table", Solid(Placement(z=table - DEEP), (WIDE, WIDE, DEEP)))
+        blocks, belts = tuple(blocks), tuple(belts)
         self._blocks = [Standing(each.name, Solid(self._base(each.at, each.yaw), each.size)) for each in blocks]
         self.belts: Sequence[RunningBelt] = [RunningBelt(each, self._base(each.at, each.yaw)) for each in belts]
+        self.fixtures: tuple[Block | Belt, ...] = (
+            *(replace(each, at=self._base(each.at, each.yaw).place) for each in blocks),
+            *(replace(each, at=self._base(each.at, each.yaw).place) for each in belts),
+        )
         self.pieces: dict[str, Workpiece] = {}
         names = [each.name for each in self.fixed]
         if len(set(names)) < len(names):

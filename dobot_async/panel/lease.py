@@ -1,0 +1,102 @@
+"""Whose arm it is: one operator at a time moves it, or the program that runs beside the panel.
+
+As the lease of a bridge, between pages: who has it keeps it until it gives it back, or its connection ends, or
+somebody takes over, which everybody sees. What it has under way then ends first, and the arm stands.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Protocol
+
+from dobot_async.panel.problems import Refusal
+
+__all__ = ["Lease", "Party"]
+
+
+class Party(Protocol):
+    """Somebody who may have it.
+
+    Attributes:
+        name: Who it is, for people.
+        gone: It has left, and gets nothing any more.
+        yields: Others may take over.
+    """
+
+    name: str
+    gone: bool
+    yields: bool
+
+
+class Lease:
+    """See the module.
+
+    Args:
+        begin: Called before somebody gets it.
+        end: Ends what the holder has under way; called before anybody else gets it.
+        changed: Called with what has happened, in words.
+
+    Attributes:
+        holder: Who has it, None if nobody does.
+        freed: Set while nobody has it.
+    """
+
+    def __init__(
+        self, begin: Callable[[], Awaitable[None]], end: Callable[[], Awaitable[None]], changed: Callable[[str], None]
+    ) -> None:
+        self.holder: Party | None = None
+        self.freed = asyncio.Event()
+        self.freed.set()
+        self._begin = begin
+        self._end = end
+        self._changed = changed
+        self._changing = asyncio.Lock()
+
+    async def take(self, party: Party, *, takeover: bool = False) -> None:
+        """Return when somebody has it; raise Refusal if somebody else keeps it."""
+        async with self._changing:
+            holder = self.holder
+            if holder is party:
+                return
+
+            if holder and not (takeover and holder.yields):
+                can = "" if holder.yields else ", which does not yield to a page"
+                raise Refusal("lease", f"{holder.name} moves the arm{can}")
+
+            if holder:
+                await self._release(holder, f"{party.name} takes over from {holder.name}")
+
+            if party.gone:
+                raise Refusal("lease", f"{party.name} has gone")
+
+            await self._begin()
+            if party.gone:
+                raise Refusal("lease", f"{party.name} has gone")
+
+            self.holder = party
+            self.freed.clear()
+            self._changed(f"{party.name} moves the arm from now on")
+
+    async def end(self, party: Party, why: str) -> None:
+        """End the lease of somebody, if he has it."""
+        async with self._changing:
+            if self.holder is party:
+                await self._release(party, why)
+
+    def check(self, party: Party) -> None:
+        """Raise Refusal if somebody does not have it."""
+        if self.holder is None:
+            raise Refusal("lease", "take the lease of the arm first")
+
+        if self.holder is not party:
+            raise Refusal("lease", f"{self.holder.name} moves the arm")
+
+    async def _release(self, holder: Party, why: str) -> None:
+        """Let nothing begin any more, end what goes on, and let others have it."""
+        self.holder = None
+        try:
+            await self._end()
+        finally:
+            self.freed.set()
+            self._changed(f"{why}: {holder.name} does not move the arm any more")

@@ -1,0 +1,129 @@
+"""Who can never go on: a wait-for graph, built from what claims and pauses say, that shares no code with `Claims`.
+
+A wait leads to another one if that has to end before. A claim waits for the holders of its zones, none of whom leaves
+before all waits have ended in which it is stuck, unless it moves; a pause waits for parties, none of whom comes before
+the waits of its own have ended. Who can come to no end of such a way was to be told, and so was a claim for which
+everything is free.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dobot_async.fleet.claims import Claim, Claims, Party, Pause
+
+__all__ = ["Scene", "Wait", "end", "named", "watch"]
+
+Wait = Claim | Pause
+TICK = 0.01  # virtual seconds between two looks
+TURNS = 5  # of the loop, in which what has just happened is told to all
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A moment.
+
+    Attributes:
+        held: Who holds which zones.
+        claims: Those that wait, oldest first.
+        pauses: Those that go on.
+    """
+
+    held: Sequence[tuple[Party, frozenset[str]]]
+    claims: Sequence[Claim]
+    pauses: Sequence[Pause]
+
+    @classmethod
+    def of(cls, claims: Claims) -> Scene:
+        """What is the case in a cell."""
+        held = [(claim.party, claim.zones) for claim in claims.held]
+        return cls(held, claims.waiting, list(claims._pauses))
+
+    def forgotten(self) -> list[tuple[Wait, str]]:
+        """All that should have been told, and why."""
+        granted = [(claim, "nothing is in its way") for claim in self.claims if self.is_due(claim)]
+        vain = [(claim, why) for claim in self.claims for why in self.in_vain(claim)]
+        return [*granted, *vain, *((wait, "all that it waits for waits for it") for wait in self.endless())]
+
+    def in_the_way(self, claim: Claim) -> list[Party]:
+        """Who holds what it is for; where it is known to be already, it may go on beside others."""
+        wanted = claim.zones - claim.party.inside
+        return [party for party, zones in self.held if party not in claim.own and wanted & zones]
+
+    def in_vain(self, claim: Claim) -> Iterator[str]:
+        """Whether it waits for somebody who will never leave."""
+        for party in self.in_the_way(claim):
+            if party.failure:
+                yield f"{party.name} has failed"
+            elif claim.parked(party) and not party.moving():
+                yield f"nobody moves {party.name}"
+
+    def before(self, wait: Wait) -> list[Wait]:
+        """What has to end before a wait does, whoever comes first."""
+        waits: list[Wait] = [*self.claims, *self.pauses]
+        if isinstance(wait, Pause):
+            return [each for party in wait.awaited() for each in waits if each.asker is party]
+
+        resting = [party for party in self.in_the_way(wait) if not party.moving()]
+        return [each for party in resting for each in waits if party in each.stuck]
+
+    def earlier(self, claim: Claim) -> list[Claim]:
+        """Those that came first for the same."""
+        return [each for each in self.claims[: self.claims.index(claim)] if each.zones & claim.zones]
+
+    def endless(self) -> list[Wait]:
+        """The waits that are left when all are taken away that can end."""
+        left: list[Wait] = [*self.claims, *self.pauses]
+        while True:
+            ending = [wait for wait in left if not any(each in left for each in self.before(wait))]
+            if not ending:
+                return left
+
+            left = [wait for wait in left if wait not in ending]
+
+    def is_due(self, claim: Claim) -> bool:
+        """Whether its zones are free, and who came first waits for it anyway."""
+        return not self.in_the_way(claim) and all(claim in self.all_before(each) for each in self.earlier(claim))
+
+    def all_before(self, claim: Claim) -> list[Wait]:
+        """What has to end, directly or not, before a claim is granted in its turn."""
+        found: list[Wait] = [claim]
+        for each in found:  # which grows
+            turns: Sequence[Wait] = self.earlier(each) if isinstance(each, Claim) else []
+            found += [other for other in (*self.before(each), *turns) if other not in found]
+
+        return found[1:]
+
+
+def named(wait: Wait) -> str:
+    """A wait, for messages."""
+    who = wait.asker.name if wait.asker else "?"
+    return f"{who} {wait.what}" if isinstance(wait, Pause) else f"{who}, for {sorted(wait.zones)},"
+
+
+async def watch(claims: Claims) -> Any:
+    """Looks until it is cancelled; raises AssertionError if somebody is left to wait who should have been told."""
+    while True:
+        before = {wait for wait, _ in Scene.of(claims).forgotten()}
+        if before:
+            for _ in range(TURNS):
+                await asyncio.sleep(0)
+
+            for wait, why in Scene.of(claims).forgotten():
+                assert wait not in before, f"{named(wait)} is left to wait although {why}"
+
+        await asyncio.sleep(TICK)
+
+
+async def end(watching: Sequence[asyncio.Task[Any]]) -> None:
+    """Ends those who look, and raises what one of them has seen."""
+    for task in watching:
+        task.cancel()
+
+    await asyncio.wait(watching)
+    for task in watching:
+        if not task.cancelled():
+            task.result()
