@@ -59,6 +59,9 @@ class Unwatched:
     def note(self, motion: Motion) -> None:
         """Do nothing."""
 
+    def count(self, error: DobotError | None) -> None:
+        """Do nothing: it is no motion of the queue."""
+
 
 @asynccontextmanager
 async def follow_target(

@@ -71,6 +71,11 @@ class Link(Twin[AsyncLink[Any]]):
         return self.asynchronous.stats
 
     @property
+    def round_trip(self) -> float | None:
+        """Seconds that an answer takes on the average; None before the first one."""
+        return self.asynchronous.round_trip
+
+    @property
     def state(self) -> Watched[LinkState]:
         """Its `value` says whether it is open, is being reopened, was lost or closed; `for` yields changes."""
         return Watched(self.asynchronous.state)

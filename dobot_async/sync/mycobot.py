@@ -10,8 +10,6 @@ from contextlib import AbstractContextManager
 from typing import Any, Literal, Self, SupportsFloat, TypeVar
 
 from dobot_async._core.protocol.wire import Command
-from dobot_async._core.queue.motion import Motion
-from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.workspace import Workspace
 from dobot_async.arms.info import DeviceInfo
@@ -136,15 +134,6 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
     def pending(self) -> int:
         """How many accepted commands are not known to have ended."""
         return self.asynchronous.pending
-
-    @property
-    def on_motion(self) -> Hooks[[Motion]]:
-        """Hooks, called with each Motion when it was put, when the arm has accepted it, and when it has ended."""
-        return self.asynchronous.on_motion
-
-    def note(self, motion: Motion) -> None:
-        """Tell those who look on what has become of a Motion."""
-        PORTAL.look(lambda: self.asynchronous.note(motion))
 
 
 class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):

@@ -107,6 +107,11 @@ class Link(Exchange[F]):
         self._stats.bad_frames = self._parser.bad_frames
         return LinkStats(**{name: getattr(self._stats, name) for name in LinkStats.__slots__})
 
+    @property
+    def round_trip(self) -> float | None:
+        """Seconds that an answer takes on the average; None before the first one."""
+        return self._round_trip.smoothed
+
     def frame(self, command: Command[Q, Any], value: Q, *, queued: bool = False) -> F:
         """Return the frame of a request; raise ValueError or TypeError where the arm could not take it."""
         if self._read_only and command.write:

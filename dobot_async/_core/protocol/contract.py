@@ -97,6 +97,7 @@ class LinkStats:
         sent: Requests, repeated ones included.
         received: Whole frames with a good checksum.
         repeated: Requests that were sent again.
+        lost: Requests that the arm did not answer in their turn: they, or the answers to them, were lost.
         timeouts: Calls that failed because no answer came.
         unexpected: Frames that nobody waited for.
         junk_bytes: Bytes that belong to no frame.
@@ -106,6 +107,7 @@ class LinkStats:
     sent: int = 0
     received: int = 0
     repeated: int = 0
+    lost: int = 0
     timeouts: int = 0
     unexpected: int = 0
     junk_bytes: int = 0

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Coroutine, Generator, Sequence
 from contextlib import AbstractAsyncContextManager, AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TypeVar
@@ -43,10 +43,12 @@ class QueueCore:
 
     Attributes:
         epoch: What a motion in several steps is bound to; a stop ends it, and the next one is here.
+        outcomes: How many motions ended, by how: "done", or the name of the error that they raise.
     """
 
     def __init__(self, executor: Executor) -> None:
         self.epoch = Epoch()
+        self.outcomes: Counter[str] = Counter()
         self._executor = executor
         executor.on_unknown.add(self.give_up)
         self._outbox = Outbox(self._accepted)
@@ -141,6 +143,10 @@ class QueueCore:
         """Tell those who look on what has become of a Motion."""
         if self.on_motion:
             self.on_motion(motion)
+
+    def count(self, error: DobotError | None) -> None:
+        """Take note of how something ended that moves the arm."""
+        self.outcomes["done" if error is None else type(error).__name__] += 1
 
     def roaming(self) -> AbstractAsyncContextManager[None]:
         """While this is entered, the arm may go anywhere; in a fleet it waits until it may."""

@@ -28,6 +28,9 @@ class Watcher(Protocol):
     def note(self, motion: Motion) -> None:
         """Tell those who look on what has become of a Motion."""
 
+    def count(self, error: DobotError | None) -> None:
+        """Take note of how something ended that moves the arm."""
+
 
 class Motion:
     """One queued command; awaitable any number of times, by any number of tasks.
@@ -124,6 +127,8 @@ class Motion:
             self._ended.set()
             self.accepted_or_ended.set()
             self._queue.note(self)
+            if self.moves:
+                self._queue.count(error)
 
 
 LOOKED_AT = 1.0
