@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from typing import Literal, TypeVar
 
@@ -164,9 +164,11 @@ class Guard(Whereabouts[S]):
 
             yield
 
-    async def watch_limits(self) -> str:
-        """Return why a jog has to end: the tool is about to leave the limits."""
-        return await self._limits.watch(self._planner.tool)
+    async def halt_at_limits(self, halt: Callable[[], Awaitable[None]]) -> str:
+        """Stop a jog before the tool leaves the limits, and return why it was stopped."""
+        why = await self._limits.watch(self._planner.tool)
+        await halt()
+        return why
 
     @property
     def is_limited(self) -> bool:
