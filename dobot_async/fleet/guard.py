@@ -19,7 +19,7 @@ from typing import Literal, TypeVar
 
 from dobot_async._core.queue.motion import Motion
 from dobot_async.fleet.claims import Claim, Party
-from dobot_async.fleet.course import Course, Step
+from dobot_async.fleet.course import Course, Step, shifted
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.limits import Limits
 from dobot_async.fleet.planner import Planner, Stance
@@ -92,7 +92,11 @@ class Guard(Whereabouts[S]):
 
             changes = True
             after = None if plan.end is None else self._zones_of(plan.end.region)
-            steps.append(Step(motion, self._zones_of(plan.region), after))
+            zones, region = self._zones_of(plan.region), plan.region if motion.moves else None
+            steps.append(step := Step(motion, zones, after, region, plan.shift))
+            if plan.shift:
+                step.zones = zones.union(*(self._zones_of(*stopped) for stopped in shifted(ahead + steps)))
+
             stance = plan.end
 
         return Course(steps, stance, changes)

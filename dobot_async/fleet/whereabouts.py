@@ -251,9 +251,9 @@ class Whereabouts(Generic[S]):
         """The zones in its reach."""
         return self._zones_of(self._planner.reach(self._stance))
 
-    def _zones_of(self, region: Region) -> frozenset[str]:
-        """The zones in a region."""
-        return region.zones(self._zones, self._base, self._margin)
+    def _zones_of(self, region: Region, shift: float = 0.0) -> frozenset[str]:
+        """The zones in a region, of a tool that may be so many mm elsewhere."""
+        return region.zones(self._zones, self._base, self._margin + shift)
 
     def _settle(self) -> None:
         """Hold what the arm is in or has ahead, and nothing else.
