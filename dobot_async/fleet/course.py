@@ -9,13 +9,13 @@ from typing import Generic, TypeVar
 from dobot_async._core.queue.motion import Motion
 from dobot_async.fleet.planner import Region, Stance
 
-__all__ = ["Course", "Step", "shifted"]
+__all__ = ["PlannedCourse", "PlannedStep", "shifted"]
 
 S = TypeVar("S", bound=Stance)
 
 
 @dataclass(eq=False, slots=True)
-class Step:
+class PlannedStep:
     """One command on its way.
 
     Attributes:
@@ -36,7 +36,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Course(Generic[S]):
+class PlannedCourse(Generic[S]):
     """Several commands that are sent together, looked at before they are.
 
     Attributes:
@@ -45,7 +45,7 @@ class Course(Generic[S]):
         moves: Whether one of them moves the arm, or changes its ways.
     """
 
-    steps: Sequence[Step]
+    steps: Sequence[PlannedStep]
     end: S | None
     moves: bool
 
@@ -55,7 +55,7 @@ class Course(Generic[S]):
         return frozenset[str]().union(*(step.zones for step in self.steps))
 
 
-def shifted(steps: Sequence[Step]) -> list[tuple[Region, float]]:
+def shifted(steps: Sequence[PlannedStep]) -> list[tuple[Region, float]]:
     """Returns where the arm may be stopped by an alarm on its way, and by how many mm its tool is elsewhere then.
 
     What is queued behind a motion that an alarm has ended is done where that has ended, unless it is a motion.

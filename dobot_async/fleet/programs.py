@@ -8,11 +8,11 @@ from contextlib import AbstractAsyncContextManager
 from typing import Any, Concatenate, ParamSpec, TypeVar, overload
 
 from dobot_async.errors import DobotError
-from dobot_async.fleet.claims import Party
-from dobot_async.fleet.crew import Crew
-from dobot_async.fleet.seat import Seat
+from dobot_async.fleet.claims import ZoneHolder
+from dobot_async.fleet.crew import FleetBase
+from dobot_async.fleet.seat import FleetArm
 from dobot_async.fleet.work import named, side_by_side
-from dobot_async.fleet.zones import Program, Run, here, running
+from dobot_async.fleet.zones import FleetProgram, Run, here, running
 
 __all__ = ["Programs"]
 
@@ -21,7 +21,7 @@ T = TypeVar("T")
 P = ParamSpec("P")
 
 
-class Programs(Crew[A]):
+class Programs(FleetBase[A]):
     """The part of `Fleet` that runs programs."""
 
     @overload
@@ -46,9 +46,9 @@ class Programs(Crew[A]):
         """
         parent, epoch = here(), self._epoch
 
-        async def done(seat: Seat) -> Any:
+        async def done(seat: FleetArm) -> Any:
             method = getattr(seat.arm, verb) if isinstance(verb, str) else None
-            part = Program(Party(f"each {seat.name}"), asyncio.current_task(), parent, epoch=epoch)
+            part = FleetProgram(ZoneHolder(f"each {seat.name}"), asyncio.current_task(), parent, epoch=epoch)
             try:
                 with running(part):
                     part.check()
@@ -72,11 +72,11 @@ class Programs(Crew[A]):
                 arm that failed lets them go on.
         """
         parent, epoch = here(), self._epoch
-        run = Run({name: Party(f"program {name}") for name in programs}, set(programs))
+        run = Run({name: ZoneHolder(f"program {name}") for name in programs}, set(programs))
 
         async def ran(name: str, program: Coroutine[Any, Any, T]) -> T:
             arm = name if name in self._seats else None
-            part = Program(run.parties[name], asyncio.current_task(), parent, arm, run, epoch)
+            part = FleetProgram(run.parties[name], asyncio.current_task(), parent, arm, run, epoch)
             if arm:
                 self._zones.drive(arm, part)
 
