@@ -43,7 +43,7 @@ class ZenohArms:
             ConnectFailed: There is no Zenoh, or it cannot be started.
         """
         from dobot_async.transports.zenoh.config import ZenohConfig, library
-        from dobot_async.transports.zenoh.session import ZenohSession
+        from dobot_async.transports.zenoh.session import KeyExpressions, ZenohSession
 
         try:
             library()

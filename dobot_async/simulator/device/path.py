@@ -5,8 +5,8 @@
     jump(...) -----------> Legs -'
 
 A joint vector has any length; kinematics come as a `JointSolver`. The end of a curve has to be within reach, or
-planning raises the solver's fault. On the way the reach is looked at every few mm and degrees, and a leg that leaves it ends at
-that place, with the fault of the way (Dobot's codes: that of the plan and 0x10).
+planning raises the solver's fault. On the way the reach is looked at every few mm and degrees, and a leg that leaves it
+ends at that place, with the fault of the way (Dobot's codes: that of the plan and 0x10).
 """
 
 from __future__ import annotations
