@@ -9,7 +9,7 @@
 # make format    what ruff can mend
 # make sync      writes the blocking classes out of the asynchronous ones again
 # make lerobot   the contract tests of integrations/, with LeRobot but without what only its training needs
-# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|stops]
+# make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|lost|stops]
 # make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 

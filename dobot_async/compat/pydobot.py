@@ -24,7 +24,7 @@ __all__ = ["MODE_PTP", "Alarm", "Dobot", "DobotException", "Joints", "PTPMode", 
 DobotException = DobotError
 MODE_PTP = PTPMode
 enums = SimpleNamespace(PTPMode=PTPMode)
-"""The enumerations of pydobot.enums."""
+"""pydobot's module of numbers."""
 
 
 class Dobot(BaseDobot):

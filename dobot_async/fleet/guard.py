@@ -2,17 +2,9 @@
 
     put --> plan (planner) --> zones on it --claim--> enter --> sent --> done --> the zones behind are released
 
-1. The arm holds a zone from before a motion into it is sent until the arm is known to stand outside, so that two
-   guarded arms are never in one zone, whatever programs do.
-2. Where the arm may be is `standing`, the zones of all steps that have not ended, and everything in its reach while it
-   is on a way that is not known: homing, jogs, and what an earlier program has left in its queue.
-3. It is read from the arm alone, when no step is left and the arm has heard its stop and rests.
-4. An arm without anything to do is looked at again before its next motion: it may have been switched off, or led by
-   hand.
-5. An arm that was switched off and on does not know where it is: it may be anywhere in its reach, and each of its ways
-   may lead anywhere there, until it was homed.
-6. Whatever ends, a step, a jog or a look, all claims are judged anew: an arm that does not tell where it stands keeps
-   what it holds, and yet it rests. It is asked again until it tells.
+The arm holds a zone from before a motion into it is sent until the arm is known to stand outside, so that two guarded
+arms are never in one zone, whatever programs do. Where it may be is found out in `whereabouts`; each way of one that
+was switched off and on may lead anywhere in its reach, until it was homed.
 
 What is looked at is the tool's place; `clearance` is for what is around it.
 """
@@ -22,36 +14,25 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
-from contextlib import asynccontextmanager, suppress
-from typing import Generic, Literal, Protocol, TypeVar
+from contextlib import asynccontextmanager
+from typing import Literal, TypeVar
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async.arms.magician.paths import STEP
-from dobot_async.errors import DobotError
 from dobot_async.fleet.claims import Claim, Party
 from dobot_async.fleet.course import Course, Step
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.limits import Limits
-from dobot_async.fleet.planner import Planner, Region, Stance
+from dobot_async.fleet.planner import Planner, Stance
+from dobot_async.fleet.whereabouts import Stops, Whereabouts
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Guard", "Mode"]
 
 Mode = Literal["off", "wait", "raise"]
 S = TypeVar("S", bound=Stance)
-BETWEEN_READINGS = 0.1  # seconds
-AT_REST = 0.05  # mm between two readings of an arm that stands; the slowest of jogs comes further
-ROUNDING = 0.1  # mm; what numbers lose on the line, and an arc bulges between two places
 
 
-class Stops(Protocol):
-    """The arm's queue, as far as the guard is concerned."""
-
-    async def stops_heard(self) -> None:
-        """Return when no stop goes on any more; raise ReplyTimeout if the arm does not hear it."""
-
-
-class Guard(Generic[S]):
+class Guard(Whereabouts[S]):
     """The guard of one arm.
 
     Args:
@@ -79,29 +60,9 @@ class Guard(Generic[S]):
         clearance: float,
         limits: Limits,
     ) -> None:
+        super().__init__(steps, planner, queue, zones, party, base=base, clearance=clearance)
         self.patient = mode == "wait"
-        self._steps = steps
-        self._planner = planner
-        self._queue = queue
-        self._zones = zones
-        self._party = party
-        self._base = base
-        self._margin = clearance + STEP / 2 + ROUNDING
         self._limits = limits
-        self._claims: list[Claim] = []
-        self._stance: S | None = None  # after all steps
-        self._standing: frozenset[str] = frozenset()
-        self._located = False
-        self._loose: list[frozenset[str]] = []  # where the arm may be by what is no step: jogs, leftovers, changes
-        self._mute = False  # whether it did not tell where it is when it was asked last
-        self._looking = 0
-        self._plans = 0
-        party.moving = lambda: bool(steps or self._loose or self._looking)
-
-    @property
-    def holds(self) -> frozenset[str]:
-        """The zones that the arm is in, or has ahead."""
-        return frozenset[str]().union(*(claim.zones for claim in self._claims))
 
     async def plan(self, motions: Sequence[Motion]) -> Course[S]:
         """Look at commands that are to be sent together; nothing is held yet.
@@ -135,21 +96,6 @@ class Guard(Generic[S]):
             stance = plan.end
 
         return Course(steps, stance, changes)
-
-    def enter(self, course: Course[S], claim: Claim | None) -> None:
-        """Take note that what was looked at is sent now, with a claim on its zones that was granted."""
-        if claim:
-            self._claims.append(claim)
-
-        self._steps.extend(course.steps)
-        for step in course.steps:
-            step.homing = self._planner.begun(step.motion.entry.value)
-            if step.motion.moves:
-                self._party.inside &= step.after or frozenset()
-
-        if course.moves:
-            self._plans += 1
-            self._stance = course.end
 
     async def claim(self, zones: frozenset[str], deadline: float | None) -> Claim | None:
         """Wait for zones, or raise, as the mode says.
@@ -218,109 +164,16 @@ class Guard(Generic[S]):
 
             yield
 
-    async def glimpse(self) -> None:
-        """Take the arm to go anywhere in its reach, from now on until `until` has ended."""
-        await self._planner.look()
-        self._loose.append(self._anywhere())
-        self.unsure()
-        self._settle()
-
-    async def until(self, leftovers: Callable[[], Awaitable[None]]) -> None:
-        """Wait until the arm has done what an earlier program has left behind, and find out where it stands then."""
-        with suppress(DobotError):
-            await leftovers()
-
-        self._standing |= self._loose.pop()
-        await self.catch_up()
-
-    async def catch_up(self) -> None:
-        """Take note of all that is known to have ended: what it held may be what is asked for next."""
-        self._doubt()
-        try:
-            while self._steps and self._steps[0].motion.ended:
-                if self._steps[0].motion.exception():
-                    self._forget()
-                else:
-                    self._done(self._steps.popleft())
-
-            if self.is_sought:
-                await self.locate()
-        except DobotError:
-            pass  # it does not tell, and keeps what it holds until it does
-        finally:
-            self._settle()
-
-    def _done(self, step: Step) -> None:
-        """Take note that the first step is done."""
-        if step.homing is not None:
-            self._planner.homed(step.homing)
-
-        if step.after is not None:
-            self._standing, self._located = step.after, True
-        elif step.motion.moves or step.zones:
-            self._standing |= step.zones
-            self._located = False
-
-    def unsure(self) -> None:
-        """Take note that the arm is stopped, somewhere on its way."""
-        self._located, self._stance = False, None
-        self._plans += 1
-
-    async def locate(self) -> None:
-        """Find out where the arm stands once it does; raise DobotError if it does not tell."""
-        plans = self._plans
-        self._looking += 1
-        self._mute = True
-        try:
-            await self._queue.stops_heard()
-            await self._rest()
-            stance = await self._planner.look()
-            self._mute = False
-            if plans == self._plans and not self._loose:
-                self._stands(stance)
-        finally:
-            self._looking -= 1
-            self._settle()
-
-    @property
-    def is_sought(self) -> bool:
-        """Whether the arm rests somewhere that it is still to be asked about. One that has failed is asked once."""
-        return not (self._located or self._busy or (self._mute and self._party.failure))
-
-    async def watch_limits(self) -> str:
-        """Return why a jog has to end: the tool is about to leave the limits."""
-        return await self._limits.watch(self._planner.tool)
+    async def halt_at_limits(self, halt: Callable[[], Awaitable[None]]) -> str:
+        """Stop a jog before the tool leaves the limits, and return why it was stopped."""
+        why = await self._limits.watch(self._planner.tool)
+        await halt()
+        return why
 
     @property
     def is_limited(self) -> bool:
         """Whether there are limits."""
         return self._limits.box is not None
-
-    @property
-    def _busy(self) -> bool:
-        """Whether the arm has something to do, so that where it stands says little."""
-        return bool(self._steps or self._loose)
-
-    async def _be_sure(self) -> None:
-        """Know where the arm stands, if it has nothing to do; it may have moved since it was looked at last."""
-        self._doubt()
-        if not self._located:
-            self._forget()
-        elif not (self._busy or self._planner.astray):
-            plans, seen = self._plans, await self._planner.look()
-            if plans == self._plans and self._stance and self._stance.near(seen):
-                self._planner.settled(seen)
-                self._stance = seen
-            else:
-                self.unsure()
-
-        if not (self._located or self._busy):
-            await self.locate()
-
-    def _doubt(self) -> None:
-        """Trust no place that was read before the arm lost it."""
-        if self._planner.astray and self._stance:
-            self.unsure()
 
     def _check_homed(self) -> None:
         """Raise ValueError if the arm has limits, and does not know where it is."""
@@ -329,75 +182,3 @@ class Guard(Generic[S]):
                 f"{self._party.name}: it has lost its place, and cannot be kept within its limits until it was homed; "
                 "await home() first"
             )
-
-    @asynccontextmanager
-    async def _loosened(self, claim: Claim | None) -> AsyncGenerator[None]:
-        """While this is entered, the arm may be wherever a claim lets it, and its stance is not known."""
-        if claim:
-            self._claims.append(claim)
-
-        zones = claim.zones if claim else frozenset[str]()
-        self._loose.append(zones)
-        self.unsure()
-        try:
-            yield
-        finally:
-            self._loose.remove(zones)
-            self._standing |= zones
-            self.unsure()
-            await self.catch_up()
-
-    async def _rest(self) -> None:
-        """Return when the tool stands."""
-        before = await self._planner.tool()
-        while True:
-            await asyncio.sleep(BETWEEN_READINGS)
-            now = await self._planner.tool()
-            if all(abs(a - b) < AT_REST for a, b in zip(before, now, strict=True)):
-                return
-
-            before = now
-
-    def _stands(self, stance: S) -> None:
-        """Take note of where the arm stands, with nothing to do."""
-        self._planner.settled(stance)
-        self._located = True
-        if self._planner.astray:
-            self._stance = None
-            self._standing |= self._anywhere()
-            self._party.inside &= self.holds  # another one may be where it was looked at last
-        else:
-            region, self._stance = stance.region, stance
-            self._standing = self._zones_of(region)
-            inside = region.zones(self._zones, self._base, ROUNDING)
-            self._party.inside = inside if region.known else frozenset()
-
-    def _forget(self) -> None:
-        """Drop steps that have failed; the arm may be anywhere on their way."""
-        while self._steps and self._steps[0].motion.ended:
-            self._standing |= self._steps.popleft().zones
-
-    def _anywhere(self) -> frozenset[str]:
-        """The zones in its reach."""
-        return self._zones_of(self._planner.reach(self._stance))
-
-    def _zones_of(self, region: Region) -> frozenset[str]:
-        """The zones in a region."""
-        return region.zones(self._zones, self._base, self._margin)
-
-    def _settle(self) -> None:
-        """Hold what the arm is in or has ahead, and nothing else.
-
-        A zone that another arm holds is not taken by who is only near it: who holds a zone may move in it.
-        """
-        ahead = frozenset[str]().union(*self._loose, *(step.zones for step in self._steps))
-        others = (claim.zones for claim in self._zones.claims.held if claim.party is not self._party)
-        needed = ahead | self._standing
-        missing = (ahead | self._party.inside & self._standing | self._standing.difference(*others)) - self.holds
-        if missing:
-            claim = Claim(self._party, frozenset([self._party]), missing)
-            self._claims.append(claim)
-            self._zones.claims.take(claim)
-
-        self._zones.claims.keep(self._claims, needed)
-        self._claims = [claim for claim in self._claims if claim.zones]

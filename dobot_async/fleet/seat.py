@@ -5,32 +5,31 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Mapping, Sequence
-from contextlib import asynccontextmanager, nullcontext, suppress
+from contextlib import asynccontextmanager, suppress
 from contextvars import ContextVar
 from typing import Any, cast
-
-import anyio
 
 from dobot_async._core.protocol.contract import LinkState
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.arms.base import Arm
-from dobot_async.errors import ConnectionLost, DobotError, MotionStopped, ReplyTimeout
-from dobot_async.fleet.claims import Claim, Party, Pause
+from dobot_async.errors import ConnectionLost, DobotError, MotionStopped
+from dobot_async.fleet.claims import Claim
 from dobot_async.fleet.course import Course, Step
 from dobot_async.fleet.families import Family, family_of
+from dobot_async.fleet.follower import Follower
 from dobot_async.fleet.guard import Guard
 from dobot_async.fleet.limits import Limits
 from dobot_async.fleet.member import Member
 from dobot_async.fleet.queue import FleetQueue
+from dobot_async.fleet.turn import Turn
 from dobot_async.fleet.work import named
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Member", "Seat", "tell_to_stop"]
 
 
-BETWEEN_LOOKS = 1.0  # seconds until an arm that did not tell where it stands is asked again
 recovering: ContextVar[Seat | None] = ContextVar("recovering", default=None)
 """The arm that is made ready again here: what that takes, such as power, passes though the arm is stopped."""
 
@@ -49,6 +48,7 @@ class Seat:
         member: What it is.
         family: Its family.
         party: As what it holds zones.
+        guard: What keeps it out of zones that others hold, if anything does.
         stopped: Why it may not move; None while all is well.
         commands: Whether it is connected to command it, not only to look on.
         stops_on_error: Whether it stops when the fleet is left by an error.
@@ -66,21 +66,18 @@ class Seat:
         self.member = member
         self.family: Family = family_of(member.kind)
         self.party = zones.arms[name]
-        self._arm: Arm | None = None
+        self.guard: Guard[Any] | None = None
         self.stopped: DobotError | None = None
         self.commands = self.stops_on_error = False
+        self._arm: Arm | None = None
         self._zones = zones
         self._failed = failed
         self._works = works
-        self._guard: Guard[Any] | None = None
         self._steps: deque[Step] = deque()
-        self._order = anyio.Lock(fast_acquire=True)
-        self._commanding: tuple[Party, ...] = ()
+        self._turns = Turn(name, zones)
         self._halting: Any = None  # the frame that stops the arm, ready to be sent
-        self._quiet = False
         self._tasks: set[asyncio.Task[None]] = set()
-        self._follower: asyncio.Task[None] | None = None
-        self._seeker: asyncio.Task[None] | None = None
+        self._follower = Follower(self._steps, self._spawn)
 
     @property
     def connected(self) -> bool:
@@ -108,7 +105,7 @@ class Seat:
             self._halting = arm.link.frame(self.family.stop, None)
 
         if member.guard != "off":
-            self._guard = guard = Guard(
+            self.guard = self._follower.guard = guard = Guard(
                 self._steps,
                 self.family.planner(arm, member.rail),
                 self.queue,
@@ -121,7 +118,7 @@ class Seat:
             )
             if options.get("queue") == "keep" and self.commands:
                 await guard.glimpse()
-                self._spawn(self._leave_behind(guard, arm), "leftovers")
+                self._follower.leave(guard, lambda: self.family.leftovers(arm))
             else:
                 await guard.locate()
 
@@ -165,7 +162,7 @@ class Seat:
     @asynccontextmanager
     async def roaming(self, halt: Callable[[], Awaitable[None]] | None) -> AsyncGenerator[None]:
         """While this is entered, the arm may go anywhere, but for its limits, where it is stopped."""
-        guard = self._guard
+        guard = self.guard
         async with self._turn():
             if guard is None:
                 yield
@@ -178,7 +175,7 @@ class Seat:
                 return
 
             async with guard.roaming():
-                watch = self._spawn(halted_at_limits(guard, halt), "limits")
+                watch = self._spawn(guard.halt_at_limits(halt), "limits")
                 try:
                     yield
                 finally:
@@ -190,11 +187,11 @@ class Seat:
     @asynccontextmanager
     async def changing(self, value: object) -> AsyncGenerator[None]:
         """While this is entered, something changes at once on which the arm's ways depend."""
-        if self._guard is None:
+        if self.guard is None:
             yield
             return
 
-        async with self._turn(), self._guard.changing(value):
+        async with self._turn(), self.guard.changing(value):
             yield
 
     @asynccontextmanager
@@ -211,8 +208,8 @@ class Seat:
 
     def ended(self, error: DobotError) -> None:
         """Takes note of what ends all motions of the arm; whatever is no stop is a failure."""
-        if self._guard:
-            self._guard.unsure()
+        if self.guard:
+            self.guard.unsure()
 
         self._zones.claims.interrupt(self.party, error)
         if not isinstance(error, MotionStopped):
@@ -227,7 +224,8 @@ class Seat:
         finally:
             recovering.reset(before)
 
-        await self.locate()
+        if self.guard:
+            await self.guard.locate()
 
     def check(self) -> None:
         """Raises MotionStopped if the arm, or the program that asks, may not move any more."""
@@ -259,72 +257,38 @@ class Seat:
 
     def quiet(self, quiet: bool) -> None:
         """Says whether the arm is to be left alone for now, although it has motions that nobody awaits."""
-        self._quiet = quiet
-        self.follow()
-
-    async def locate(self) -> None:
-        """Finds out anew which zones the arm is in."""
-        if self._guard:
-            await self._guard.locate()
+        self._follower.quiet = quiet
+        self._follower.follow()
 
     async def aclose(self) -> None:
         """Joins what `end` has cancelled."""
         if self._tasks:
             await asyncio.wait(self._tasks)
 
-    def follow(self) -> None:
-        """Watches motions to their end, though nobody may await them: an arm that fails is to stop the others."""
-        if self._steps and not self._quiet and (self._follower is None or self._follower.done()):
-            self._follower = self._spawn(self._follow(), "follower")
-
-        if self._guard and self._guard.is_sought and (self._seeker is None or self._seeker.done()):
-            self._seeker = self._spawn(self._seek(self._guard), "seeker")
-
     async def take_turn(self, deadline: float | None) -> None:
-        """Takes the lock of the order: nobody else commands the arm until `end_turn`.
-
-        Raises:
-            ZoneDeadlock: Who has it waits, in the end, for who asks.
-            ReplyTimeout: Others took too long.
-        """
-        program = here()
-        stuck = self._zones.driven(program) | {program.party}
-        turn = Pause(f"to command {self.name} behind", program.party, stuck, lambda: self._commanding)
-        try:
-            async with asyncio.timeout_at(deadline):
-                with self._zones.claims.pausing(turn) if self._order.locked() else nullcontext():
-                    await self._order.acquire()
-        except TimeoutError:
-            raise ReplyTimeout(f"{self.name}: others were before it, and took too long") from None
-
-        self._commanding = (program.party,)
+        """Returns when nobody else commands the arm, until `end_turn`; see `Turn.take`."""
+        await self._turns.take(deadline)
 
     def end_turn(self) -> None:
         """Lets others command the arm, and watches to its end what it was told."""
-        self._commanding = ()  # from now on, although the next one goes on only when the loop lets it
-        self._order.release()
-        self.follow()
+        self._turns.end()
+        self._follower.follow()
 
     async def plan(self, motions: Sequence[Motion]) -> Course[Any]:
         """Looks at what is to be sent together; see `Guard.plan`."""
-        if self._guard:
-            return await self._guard.plan(motions)
+        if self.guard:
+            return await self.guard.plan(motions)
 
         return Course([Step(motion) for motion in motions], None, moves=False)
 
     def enter(self, course: Course[Any], claim: Claim | None) -> None:
         """Takes note of what is sent now, with the claim on its zones."""
-        if self._guard:
-            self._guard.enter(course, claim)
+        if self.guard:
+            self.guard.enter(course, claim)
         else:
             self._steps.extend(course.steps)
 
         self._works(self)
-
-    @property
-    def guard(self) -> Guard[Any] | None:
-        """What keeps the arm out of zones that others hold, if anything does."""
-        return self._guard
 
     async def _admit(self, motions: Sequence[Motion], deadline: float | None, epoch: Epoch) -> None:
         """Takes the lock of the order, and returns when motions may be sent."""
@@ -332,7 +296,7 @@ class Seat:
         await self.take_turn(deadline)
         try:
             course = await self.plan(motions)
-            claim = await self._guard.claim(course.zones, deadline) if self._guard else None
+            claim = await self.guard.claim(course.zones, deadline) if self.guard else None
             try:
                 self.check()
                 epoch.check()
@@ -347,41 +311,9 @@ class Seat:
             self.end_turn()
             raise
 
-    async def _follow(self) -> None:
-        """Takes the steps as their motions end."""
-        while self._steps and not self._quiet:
-            step = self._steps[0]
-            with suppress(DobotError):
-                await step.motion
-
-            if self._guard:
-                await self._guard.catch_up()
-            elif step in self._steps:
-                self._steps.remove(step)
-
-        self.follow()
-
-    async def _seek(self, guard: Guard[Any]) -> None:
-        """Asks where the arm stands until it tells: what it holds until then, others may wait for."""
-        while guard.is_sought:
-            await guard.catch_up()
-            await asyncio.sleep(BETWEEN_LOOKS)
-
-    async def _leave_behind(self, guard: Guard[Any], arm: Arm) -> None:
-        """Waits for the end of what an earlier program has left in the arm's queue."""
-        await guard.until(lambda: self.family.leftovers(arm))
-        self.follow()
-
     def _spawn(self, work: Any, what: str) -> asyncio.Task[None]:
         """Starts a task that ends with the seat."""
         task: asyncio.Task[None] = asyncio.create_task(work, name=f"dobot_async {self.name} {what}")
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
-
-
-async def halted_at_limits(guard: Guard[Any], halt: Callable[[], Awaitable[None]]) -> str:
-    """Stops a jog before the tool leaves the limits, and returns why it was stopped."""
-    why = await guard.watch_limits()
-    await halt()
-    return why

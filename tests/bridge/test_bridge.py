@@ -10,12 +10,15 @@ from typing import Any
 
 import pytest
 from bridge_rig import IN_TIME, TCP, Plain, Rig, ask, bridged, client, far, numbers, set_now, until
+from virtual_ports import on_the_virtual_clock, virtual_ports
 
 from dobot_async import ConnectFailed, ConnectionLost, Magician
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import Frame, encode
 from dobot_async.bridge import Limits, bridge
 from dobot_async.simulator import Faults, simulate
+
+__all__ = ["virtual_ports"]
 
 PLACES = ["tcp://127.0.0.1:0", "udp://127.0.0.1:0", "ws://127.0.0.1:0", "pty"]
 START = ask(c.SET_QUEUED_CMD_START_EXEC)
@@ -76,6 +79,7 @@ async def test_it_listens_in_several_places() -> None:
         assert {name.params for name in names} == {b"Dobot Magician\0"}
 
 
+@on_the_virtual_clock
 async def test_without_an_arm_it_does_not_begin() -> None:
     async with simulate(listen=TCP, faults=Faults(silent=True)) as sim:
         with pytest.raises(ConnectFailed, match="no arm answers"):
@@ -98,6 +102,7 @@ async def test_without_an_arm_it_does_not_begin() -> None:
         ("certificate where there is a key", {"key": "/nonexistent"}),
     ],
 )
+@on_the_virtual_clock
 async def test_wrong_arguments_are_named(wrong: str, details: Any) -> None:
     with pytest.raises(ValueError, match=wrong):
         async with bridge("sim:", **details):
@@ -107,6 +112,7 @@ async def test_wrong_arguments_are_named(wrong: str, details: Any) -> None:
 # Answers.
 
 
+@on_the_virtual_clock
 async def test_who_asks_is_answered_and_nobody_else() -> None:
     """Two programs read the same registers of the same addresses, pipelined; the answers are in their own order."""
     async with bridged() as rig, client(rig.url) as one, client(rig.url) as other:
@@ -122,6 +128,7 @@ async def test_who_asks_is_answered_and_nobody_else() -> None:
         await asyncio.gather(read(one, [*range(1, 21)] * 5), read(other, [*range(20, 0, -1)] * 5))
 
 
+@on_the_virtual_clock
 async def test_the_late_answer_to_somebody_who_has_gone_answers_nobody() -> None:
     async with bridged() as rig:
         async with client(rig.url) as plain:
@@ -136,6 +143,7 @@ async def test_the_late_answer_to_somebody_who_has_gone_answers_nobody() -> None
             assert (await plain.ask(c.GET_DEVICE_NAME)).params == b"new\0"
 
 
+@on_the_virtual_clock
 async def test_what_fits_no_request_is_left_out_and_the_next_is_answered() -> None:
     async with bridged() as rig, client(rig.url) as plain:
         await plain.send(Frame(84, 0, b"x"))
@@ -146,6 +154,7 @@ async def test_what_fits_no_request_is_left_out_and_the_next_is_answered() -> No
 # Writing.
 
 
+@on_the_virtual_clock
 async def test_commands_are_queued_in_their_order_and_once() -> None:
     targets = [c.PTPCmd(c.PTPMode.MOVJ_XYZ, 200 + place % 7, place % 11, 40, 0) for place in range(60)]
     async with bridged(speed=500.0) as rig, Magician.connect(rig.url, window=8) as arm:
@@ -157,6 +166,7 @@ async def test_commands_are_queued_in_their_order_and_once() -> None:
         assert rig.executed(c.SET_PTP_CMD) == targets
 
 
+@on_the_virtual_clock
 async def test_a_burst_without_waiting_keeps_its_order() -> None:
     async with bridged(speed=500.0) as rig, client(rig.url) as plain:
         frames = [frame for place in range(8) for frame in (set_now(10 + place), far(place))]
@@ -167,6 +177,7 @@ async def test_a_burst_without_waiting_keeps_its_order() -> None:
         assert indices == list(range(indices[0], indices[0] + 8))
 
 
+@on_the_virtual_clock
 async def test_one_program_at_a_time_moves_the_arm() -> None:
     async with bridged() as rig, client(rig.url) as first, client(rig.url) as second:
         assert not rig.bridge.holder
@@ -184,6 +195,7 @@ async def test_one_program_at_a_time_moves_the_arm() -> None:
         assert len((await second.ask(c.SET_WAIT_CMD, c.WAITCmd(0), queued=True)).params) == 8
 
 
+@on_the_virtual_clock
 async def test_a_refusal_is_told_once_however_often_it_is_asked() -> None:
     async with bridged() as rig, client(rig.url) as first, client(rig.url) as second:
         await first.send(START)
@@ -194,6 +206,7 @@ async def test_a_refusal_is_told_once_however_often_it_is_asked() -> None:
         assert len(rig.told("refused")) == 1
 
 
+@on_the_virtual_clock
 async def test_takeover() -> None:
     async with bridged(takeover=True, speed=1.0) as rig, client(rig.url) as first, client(rig.url) as second:
         await first.send(START, far())
@@ -205,6 +218,7 @@ async def test_takeover() -> None:
         await until(lambda: len(rig.told("left")) == 1)
 
 
+@on_the_virtual_clock
 async def test_an_immediate_motion_needs_the_lease_as_well() -> None:
     async with bridged() as rig, client(rig.url) as first, client(rig.url) as second:
         await first.ask(c.SET_QUEUED_CMD_START_EXEC)
@@ -213,6 +227,7 @@ async def test_an_immediate_motion_needs_the_lease_as_well() -> None:
         assert not rig.sim.arm.device.moving
 
 
+@on_the_virtual_clock
 async def test_what_is_asked_after_a_command_is_asked_after_it() -> None:
     """The command waits, because the key of its answer is taken; the question could go, and must not."""
     async with bridged() as rig, client(rig.url) as first, client(rig.url) as second:
@@ -231,6 +246,7 @@ async def test_what_is_asked_after_a_command_is_asked_after_it() -> None:
 # Stopping.
 
 
+@on_the_virtual_clock
 async def test_who_vanishes_in_the_middle_of_a_motion_stops_the_arm() -> None:
     async with bridged(speed=1.0) as rig:
         async with client(rig.url) as plain:
@@ -255,6 +271,7 @@ async def test_who_vanishes_by_udp_stops_the_arm_too() -> None:
         assert not rig.sim.arm.device.moving
 
 
+@on_the_virtual_clock
 async def test_a_motion_may_outlive_its_program() -> None:
     async with bridged(on_vanish="leave") as rig:
         async with client(rig.url) as plain:
@@ -266,6 +283,7 @@ async def test_a_motion_may_outlive_its_program() -> None:
         assert rig.told("stopped") == []
 
 
+@on_the_virtual_clock
 async def test_a_program_that_has_finished_leaves_the_arm_as_it_is() -> None:
     async with bridged() as rig:
         async with Magician.connect(rig.url) as arm:
@@ -285,6 +303,7 @@ async def test_a_program_that_has_finished_leaves_the_arm_as_it_is() -> None:
     ],
     ids=["jog", "laser", "conveyor"],
 )
+@on_the_virtual_clock
 async def test_what_moves_or_burns_without_the_queue_stops_as_well(frame: Frame) -> None:
     async with bridged(speed=1.0) as rig:
         async with client(rig.url) as plain:
@@ -297,6 +316,7 @@ async def test_what_moves_or_burns_without_the_queue_stops_as_well(frame: Frame)
         assert [motor.speed for motor in rig.sim.arm.motors] == [0, 0]
 
 
+@on_the_virtual_clock
 async def test_a_stop_overtakes_and_drops_what_waits() -> None:
     async with bridged(speed=1.0) as rig, client(rig.url) as plain:
         await plain.ask(c.SET_QUEUED_CMD_START_EXEC)
@@ -313,6 +333,7 @@ async def test_a_stop_overtakes_and_drops_what_waits() -> None:
         assert len(rig.told("refused")) == 1
 
 
+@on_the_virtual_clock
 async def test_a_client_is_answered_in_order_however_many_others_ask_the_same() -> None:
     asked = [ask(c.GET_POSE), ask(c.GET_PTP_COMMON_PARAMS), ask(c.GET_POSE), ask(c.GET_DEVICE_NAME), set_now(50)]
     async with bridged() as rig, client(rig.url) as one, AsyncExitStack() as stack:
@@ -335,6 +356,7 @@ async def test_a_client_is_answered_in_order_however_many_others_ask_the_same() 
             await asyncio.wait(reading)
 
 
+@on_the_virtual_clock
 async def test_anybody_may_switch_off_what_burns_and_drops_nothing_of_the_mover() -> None:
     laser, motors = c.EndEffectorLaser(True, True), [c.EMotor(index, False, 0) for index in (0, 1)]
     async with bridged(speed=1.0) as rig, client(rig.url) as mover, client(rig.url) as other:
@@ -361,6 +383,7 @@ async def test_anybody_may_switch_off_what_burns_and_drops_nothing_of_the_mover(
         assert not rig.told("cut")
 
 
+@on_the_virtual_clock
 async def test_anybody_may_stop_and_whose_motion_it_was_is_told() -> None:
     async with bridged(speed=1.0) as rig, client(rig.url) as other:
         with pytest.raises(ConnectionLost):
@@ -393,6 +416,7 @@ async def test_a_mover_by_udp_that_was_stopped_gets_no_more_answers() -> None:
         assert rig.sim.arm.counters.requests == requests + 1
 
 
+@on_the_virtual_clock
 async def test_the_stop_of_another_program_through_the_driver() -> None:
     async with bridged(speed=1.0) as rig, client(rig.url) as mover:
         await mover.send(START, far())
@@ -405,6 +429,7 @@ async def test_the_stop_of_another_program_through_the_driver() -> None:
             assert rig.sim.arm.device.left_space == 32
 
 
+@on_the_virtual_clock
 async def test_the_end_of_the_bridge_stops_the_arm() -> None:
     async with simulate(listen=TCP) as sim:
         async with bridge(sim.url) as running, client(running.url) as plain:
@@ -417,6 +442,7 @@ async def test_the_end_of_the_bridge_stops_the_arm() -> None:
         assert not sim.arm.device.moving
 
 
+@on_the_virtual_clock
 async def test_who_is_cancelled_stops_the_arm() -> None:
     async with bridged(speed=1.0) as rig, Magician.connect(rig.url) as arm:
 
@@ -435,6 +461,7 @@ async def test_who_is_cancelled_stops_the_arm() -> None:
 # The line to the arm.
 
 
+@on_the_virtual_clock
 async def test_the_line_to_the_arm_is_mended_and_no_motion_sent_twice() -> None:
     targets = [(200 + place % 5, 10 * (-1) ** place) for place in range(30)]
     async with bridged(speed=20.0) as rig, Magician.connect(rig.url, reply_timeout=0.1) as arm:
@@ -454,6 +481,7 @@ async def test_the_line_to_the_arm_is_mended_and_no_motion_sent_twice() -> None:
         assert [(value.x, value.y) for value in rig.executed(c.SET_PTP_CMD)] == targets
 
 
+@on_the_virtual_clock
 async def test_what_was_sent_before_an_outage_is_not_sent_after_it() -> None:
     async with bridged(speed=1.0) as rig, client(rig.url) as plain:
         await plain.ask(c.SET_QUEUED_CMD_START_EXEC)
@@ -471,6 +499,7 @@ async def test_what_was_sent_before_an_outage_is_not_sent_after_it() -> None:
         assert rig.told("link") == ["the line to the arm broke", "the arm can be reached again"]
 
 
+@on_the_virtual_clock
 async def test_who_vanishes_while_the_arm_is_out_of_reach_stops_it_afterwards() -> None:
     async with AsyncExitStack() as stack:
         rig = await stack.enter_async_context(bridged(speed=1.0))
@@ -489,6 +518,7 @@ async def test_who_vanishes_while_the_arm_is_out_of_reach_stops_it_afterwards() 
         assert not rig.sim.arm.device.moving
 
 
+@on_the_virtual_clock
 async def test_reads_survive_a_bad_line_to_the_arm() -> None:
     bad = {"faults": Faults(loss=0.02, split=0.1), "seed": 3}
     async with bridged(arm=bad) as rig, Magician.connect(rig.url, control=False) as arm:
@@ -552,6 +582,7 @@ async def test_who_misbehaves_disturbs_nobody_else(listen: str, misbehave: Any) 
         assert rig.executed(c.SET_PTP_CMD) == []
 
 
+@on_the_virtual_clock
 async def test_garbage_without_end_is_cut() -> None:
     async with bridged(limits=Limits(junk=1000)) as rig, client(rig.url) as plain:
         await plain.ask(c.GET_DEVICE_NAME)
@@ -560,6 +591,7 @@ async def test_garbage_without_end_is_cut() -> None:
         assert rig.told("cut") == ["1024 bytes without a request among them"]
 
 
+@on_the_virtual_clock
 async def test_half_a_frame_is_given_up() -> None:
     async with bridged() as rig, client(rig.url) as plain:
         await plain.transport.send(encode(far())[:3])
@@ -567,6 +599,7 @@ async def test_half_a_frame_is_given_up() -> None:
         assert (await plain.receive()).id == c.GET_DEVICE_NAME.id
 
 
+@on_the_virtual_clock
 async def test_requests_are_limited() -> None:
     """A quarter of a second's requests may come at once, the others when their time has come."""
     loop = asyncio.get_running_loop()
@@ -579,6 +612,7 @@ async def test_requests_are_limited() -> None:
         assert loop.time() - began >= 0.2
 
 
+@on_the_virtual_clock
 async def test_there_are_so_many_clients_and_no_more() -> None:
     async with bridged(limits=Limits(clients=2)) as rig, client(rig.url) as one, client(rig.url) as other:
         assert await one.hears_nothing()
@@ -602,6 +636,7 @@ async def test_who_does_not_read_does_not_hold_up_the_others() -> None:
 # What may not be sent, and not be told.
 
 
+@on_the_virtual_clock
 async def test_denied_commands_do_not_reach_the_arm() -> None:
     async with bridged(deny=["wifi", "calibration", "firmware"]) as rig, client(rig.url) as plain:
         await plain.ask(c.SET_QUEUED_CMD_START_EXEC)
@@ -617,6 +652,7 @@ async def test_denied_commands_do_not_reach_the_arm() -> None:
         assert set(rig.told("refused")) >= {"SetWIFIPassword: it is denied here", "command 160: it is denied here"}
 
 
+@on_the_virtual_clock
 async def test_a_password_is_never_told(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.DEBUG)
     async with bridged() as rig, client(rig.url) as first, client(rig.url) as second:

@@ -271,6 +271,7 @@ async def test_an_unknown_arm_is_refused_with_the_names() -> None:
             pass
 
 
+@on_the_virtual_clock
 async def test_a_magician_is_no_mycobot() -> None:
     async with simulate("magician", listen=TCP) as sim:
         with pytest.raises(ConnectFailed, match="no arm answers"):

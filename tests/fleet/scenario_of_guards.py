@@ -68,6 +68,7 @@ class Cell:
     fleet: Fleet[Magician]
     monitor: Monitor
     say: Callable[[str], None]
+    steps: Mapping[Step, int]
     told: int = 0
     done: int = 0
     failures: int = 0
@@ -75,7 +76,7 @@ class Cell:
     async def program(self, name: str, random: Random, steps: int) -> None:
         """Does this and that with its arm, and makes it ready again when it has failed."""
         for _ in range(steps):
-            what = random.choices(STEPS, WEIGHTS)[0]
+            what = random.choices(list(self.steps), list(self.steps.values()))[0]
             try:
                 async with asyncio.timeout(random.uniform(3, 30)):
                     await what(self, name, self.fleet[name], random)
@@ -266,9 +267,28 @@ async def cancelled(_: Cell, __: str, arm: Magician, random: Random) -> None:
             await arm.move_to(*place(random), mode=random.choice(MODES))
 
 
-STEPS: list[Step] = [move, joints, increment, away, batch, path, change, change_on_the_way, lift, ride, jog, home]
-STEPS += [stop, alarm, power, hold, cancelled, rest, together]
-WEIGHTS = [12, 5, 4, 8, 6, 3, 3, 3, 2, 4, 2, 1, 3, 2, 2, 3, 3, 8, 3]
+STEPS: Mapping[Step, int] = {
+    move: 12,
+    joints: 5,
+    increment: 4,
+    away: 8,
+    batch: 6,
+    path: 3,
+    change: 3,
+    change_on_the_way: 3,
+    lift: 2,
+    ride: 4,
+    jog: 2,
+    home: 1,
+    stop: 3,
+    alarm: 2,
+    power: 2,
+    hold: 3,
+    cancelled: 3,
+    rest: 8,
+    together: 3,
+}
+"""How often each is done."""
 
 
 def some_zone(random: Random) -> tuple[Zone, Box | Cylinder]:
@@ -281,6 +301,11 @@ def some_zone(random: Random) -> tuple[Zone, Box | Cylinder]:
     half = (random.uniform(20, 60), random.uniform(20, 60), random.uniform(30, 80))
     spans = [(middle - size, middle + size) for middle, size in zip((x, y, z), half, strict=True)]
     return Zone((x, y, z), half), Box(*spans)
+
+
+def in_one(zones: Mapping[str, tuple[Zone, Any]], stands: Mapping[str, Stand]) -> bool:
+    """Whether somebody would stand in a zone from the beginning."""
+    return any(zone.has(stand.tool(START, TOOLS[0]), NEAR) for zone, _ in zones.values() for stand in stands.values())
 
 
 async def leave_something(sim: Simulation, random: Random) -> None:
@@ -307,10 +332,8 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
         for name in names
     }
     zones: dict[str, tuple[Zone, Box | Cylinder]] = {}
-    while not zones:
+    while not zones or in_one(zones, stands):
         zones = {f"zone {number}": some_zone(random) for number in range(random.randint(1, 3))}
-        if any(each.has(stand.tool(START, TOOLS[0]), NEAR) for each, _ in zones.values() for stand in stands.values()):
-            zones = {}  # somebody would stand in it from the beginning
 
     async with AsyncExitStack() as stack:
         sims: dict[str, Simulation] = {}
@@ -341,7 +364,7 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
         try:
             fleet = await stack.enter_async_context(connecting)
             watching.append(asyncio.create_task(waits.watch(fleet._zones.claims)))
-            cell = Cell(random, sims, fleet, monitor, say)
+            cell = Cell(random, sims, fleet, monitor, say, STEPS)
             steps = random.randint(4, 12)
             work = fleet.run({name: cell.program(name, Random(random.random()), steps) for name in names})
             if stopped:

@@ -1,11 +1,14 @@
-"""Some seeds of each scenario of a cell; `make soak OF=cell`, `OF=guards` and `OF=stops` run more."""
+"""Some seeds of each scenario of a cell; `make soak OF=cell`, `OF=guards`, `OF=lost` and `OF=stops` run more."""
 
 from __future__ import annotations
 
 import pytest
 import scenario_of_a_cell
 import scenario_of_guards
+import scenario_of_lost_places
 import scenario_of_stops
+
+from dobot_async.fleet.magician_planner import MagicianPlanner
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -18,6 +21,11 @@ def test_a_seed_of_guarded_arms(seed: int) -> None:
     scenario_of_guards.run_seed(seed)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_seed_of_arms_that_lose_their_places(seed: int) -> None:
+    scenario_of_lost_places.run_seed(seed)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_a_seed_of_a_stop(seed: int) -> None:
     scenario_of_stops.run_seed(seed)
@@ -27,3 +35,10 @@ def test_the_monitor_sees_what_happens_without_the_guard() -> None:
     with pytest.raises(scenario_of_guards.Violation, match="are in zone"):
         for seed in range(20):
             scenario_of_guards.run_seed(seed, guard="off")
+
+
+def test_the_monitor_sees_what_happens_when_a_lost_place_is_not_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MagicianPlanner, "astray", False)
+    with pytest.raises(scenario_of_lost_places.Violation, match="are in zone"):
+        for seed in range(20):
+            scenario_of_lost_places.run_seed(seed)

@@ -56,9 +56,9 @@ def inside(sim: Simulation, box: Box = BIN) -> bool:
 async def left_behind(sim: Simulation) -> None:
     """What an earlier program leaves in an arm's queue: it waits, goes into the bin, and stays there for a while."""
     async with Magician.connect(sim.url) as arm:
-        await arm.queue.wait(30)
+        await arm.queue.wait(10)
         await arm.queue.move_to(*IN)
-        await arm.queue.wait(30)
+        await arm.queue.wait(10)
         await arm.queue.move_to(*OUT)
 
 

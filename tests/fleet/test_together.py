@@ -7,6 +7,7 @@ import gc
 from contextlib import AsyncExitStack
 from functools import partial
 from itertools import count, pairwise
+from typing import Any
 
 import pytest
 from steps import Steps
@@ -14,6 +15,7 @@ from virtual import virtual
 
 from dobot_async import ConnectionLost, DobotError, Fleet, Magician, MotionStopped, MyCobot, UltraArm
 from dobot_async.arms.magician import commands as c
+from dobot_async.arms.ultraarm import commands as u
 from dobot_async.fleet import Member
 from dobot_async.simulator import Faults, Simulation, simulate
 
@@ -201,3 +203,32 @@ async def test_families_that_cannot_pause_start_with_the_others() -> None:
 
             await together.wait()
             assert together.skew < 0.2
+
+
+@virtual
+async def test_leftovers_that_end_while_a_start_is_made_ready_have_nobody_watch_what_was_not_sent() -> None:
+    broken: list[dict[str, Any]] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: broken.append(context))
+    async with simulate("ultraarm", faults=Faults(latency=0.05)) as slow, simulate() as quick:
+        async with UltraArm.connect(slow.url) as arm:
+            await arm.home()
+            for _ in range(2):  # one is under way, and one lies in the own queue of the arm
+                arm.link.send_nowait(arm.link.frame(u.WAIT, u.Dwell(1)))
+
+            while not await arm.get_queue_size():
+                pass
+
+        members: dict[str, Member[Magician | UltraArm]] = {
+            "slow": Member(slow.url, UltraArm, {"queue": "keep"}, guard="wait"),
+            "quick": Member(quick.url, Magician),
+        }
+        async with Fleet.connect(members) as fleet:
+            assert await fleet.arm("slow", UltraArm).get_queue_size()
+            async with fleet.together() as together:
+                together["slow"].move_to(200, 0, 40)
+                together["quick"].move_to(*NEAR)
+
+            await together.wait()
+
+    gc.collect()
+    assert not broken, "a task of the driver died"

@@ -1,8 +1,9 @@
 """Runs many seeds, on all cores: `make soak SEEDS=100000`, or one with its trace: `soak.py --seed N --verbose`.
 
-`--of cell` takes the scenario of a cell instead of that of one arm, `--of guards` and `--of stops` those of guarded
-arms whose tools are watched, and of cells that are stopped. A seed that fails is printed with the command that
-replays it. `--memory` works in one process for hours of simulated time, and prints how much memory it takes.
+`--of cell` takes the scenario of a cell instead of that of one arm; `--of guards`, `--of lost` and `--of stops` those
+of guarded arms whose tools are watched, of arms that lose their places, and of cells that are stopped. A seed that
+fails is printed with the command that replays it. `--memory` works in one process for hours of simulated time, and
+prints how much memory it takes.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ SCENARIOS = {
     "cell": "scenario_of_a_cell",
     "guards": "scenario_of_guards",
     "stops": "scenario_of_stops",
+    "lost": "scenario_of_lost_places",
 }
 FOLDERS = [str(Path(__file__).parents[1] / name) for name in ("simulation", "fleet", "support", "")]
 Result = tuple[int, str, dict[str, float]]
