@@ -195,6 +195,7 @@ def test_what_a_verb_returns_is_told_by_where_it_is() -> None:
     [
         ("concepts", "[a](../examples/cp_drawing.py)", "[a](reference/examples.md#cp_drawingpy)"),
         ("concepts", "[a](../examples)", "[a](reference/examples.md)"),
+        ("concepts", "[a](../README.md#safety)", "[a](project/readme.md#safety)"),
         ("concepts", "[a](../CONTRIBUTING.md#one-test)", "[a](project/contributing.md#one-test)"),
         ("decisions/0001-x", "[a](../../examples)", "[a](../reference/examples.md)"),
         ("project/contributing", "[a](../../docs/testing.md#x)", "[a](../testing.md#x)"),

@@ -10,6 +10,7 @@ import inspect
 import io
 import tokenize
 from collections.abc import Iterator
+from importlib import import_module
 from types import ModuleType
 from typing import Any, NamedTuple, cast
 
@@ -50,7 +51,7 @@ def first_sentence(kind: type[Any]) -> str:
 
 def rows(module: ModuleType) -> Iterator[Row]:
     """All rows of a module of commands, with what its source says beside them."""
-    source = inspect.getsource(module)
+    source = inspect.getsource(written_in(module))
     comments = {
         token.start[0]: (token.start[1] == 0, token.string.lstrip("# "))
         for token in tokenize.generate_tokens(io.StringIO(source).readline)
@@ -66,3 +67,15 @@ def rows(module: ModuleType) -> Iterator[Row]:
                 yield Row(name, command, group, note, describe(command.request), describe(command.reply))
             case _:
                 pass
+
+
+def written_in(module: ModuleType) -> ModuleType:
+    """The module in which a table is written, which the public one may take whole from elsewhere."""
+    for statement in ast.parse(inspect.getsource(module)).body:
+        match statement:
+            case ast.ImportFrom(module=str(name), names=[ast.alias(name="*")]) if hasattr(import_module(name), "ALL"):
+                return written_in(import_module(name))
+            case _:
+                pass
+
+    return module

@@ -1,14 +1,15 @@
 """What pages say to those who read the files themselves, made fit for the site.
 
-Links to files outside of docs/ lead to the page that shows the file: an example is on the page of examples, and what
-has no page of its own is a download, as MyST does it. A link that leads nowhere stays as it is, and fails the build. A
-page that shows a file of the root has its text. And the list of decisions, a README as others are, is told to be the
+Links to files outside of docs/ lead to the page that shows the file: an example is on the page of examples. What has no
+page of its own is a download, as MyST does it; a folder, or a page elsewhere, is in the repository. A link
+that leads nowhere stays as it is, and fails the build. A page that shows a file of the root has its text. And the list of decisions, a README as others are, is told to be the
 parent of each of them.
 """
 
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Mapping
 from pathlib import PurePosixPath
 
@@ -18,17 +19,18 @@ from dobot_docs.names import ROOT
 
 __all__ = ["SHOWN", "register", "rewrite", "text_of"]
 
+REPOSITORY = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["urls"]["Repository"]
 RELATIVE = re.compile(r"\]\((?![a-z]+:|#)([^)\s]+)\)")
 LINK = re.compile(r"\]\(((?:\.\./)+)([\w./-]+)(#[\w-]+)?\)")
 SHOWN: Mapping[str, str] = {
     "project/changelog": "CHANGELOG.md",
     "project/contributing": "CONTRIBUTING.md",
+    "project/readme": "README.md",
     "project/security-policy": "SECURITY.md",
 }
 """The pages that show a file of the root."""
 
 PAGES: Mapping[str, str] = {
-    "README.md": "index.md",
     "examples": "reference/examples.md",
     **{file: f"{document}.md" for document, file in SHOWN.items()},
 }
@@ -59,6 +61,9 @@ def rewrite(document: str, text: str) -> str:
             page = target.removeprefix("docs/")
         elif example := EXAMPLES.fullmatch(target):
             page, anchor = PAGES["examples"], f"#{example[1]}py"
+
+        elif page is None and ((ROOT / target).is_dir() or (ROOT / target).suffix == ".md" and (ROOT / target).exists()):
+            return f"]({REPOSITORY}/tree/main/{target}{anchor or ''})"
 
         return match[0] if page is None else f"]({relative(page, depth)}{anchor or ''})"
 
