@@ -31,6 +31,7 @@ COLORS = ("#8a8a8a", "#1f6fb4", "#d1852c", "#6b9b37")
 NAMES = (
     "parser",
     "roundtrip",
+    "serial",
     "queue",
     "completion",
     "lateness",

@@ -182,6 +182,20 @@ def check_palletise(output: str) -> None:
     assert [line.partition(",")[0] for line in output.splitlines()] == ["stacks a part"] * 4 + ["puts back a part"] * 2
 
 
+def check_mcp_session(output: str) -> None:
+    """The plan tells which step cannot be done, and the others are done."""
+    tools, planned, *done = output.splitlines()
+    assert "move" in tools
+    assert planned == "planned with a picture; step 3 cannot be done"
+    assert done == ["done: move", "done: draw"]
+
+
+def check_mqtt_session(output: str) -> None:
+    """Only who has the lease moves the arm, and only where it reaches."""
+    outcomes = [line.split(": ", 1)[1] for line in output.splitlines()]
+    assert outcomes == ["refused (Refused)", "done", "done", "refused (Unreachable)", "done"]
+
+
 def check_sync_pick_and_place(output: str) -> None:
     assert [numbers(line) for line in output.splitlines()] == [[1], [2], [3]]
 
@@ -212,6 +226,8 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "follow_target.py": check_follow_target,
     "teach_and_play.py": check_teach_and_play,
     "palletise.py": check_palletise,
+    "mcp_session.py": check_mcp_session,
+    "mqtt_session.py": check_mqtt_session,
     "sync_pick_and_place.py": check_sync_pick_and_place,
     "sync_two_arms.py": check_sync_two_arms,
 }

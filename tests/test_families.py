@@ -34,7 +34,7 @@ class Chosen(Turntable):
 
 SHOWN = Shown(
     kind=Chosen, info=told, pose=told, read=told, move=turn, modes=("to",), jog=None, directions={}, suction=None,
-    describe=None, pieces=None,
+    pieces=None,
 )
 """
 """What the page leaves out: a turntable for the command line."""

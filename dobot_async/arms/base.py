@@ -11,7 +11,7 @@ speeds, modes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol, TypeVar
 
@@ -113,6 +113,10 @@ class ArmQueue(ArmVerbs[Coroutine[Any, Any, Motion]], Protocol):
     def pending(self) -> int:
         """How many accepted commands are not known to have ended."""
         ...
+
+    @property
+    def outcomes(self) -> Mapping[str, int]:
+        """How many motions ended, by how: "done", or the name of the error that they raise."""
 
     async def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
         """Queue any row of the command table that may be queued."""

@@ -41,6 +41,7 @@ class Family:
         cli: A `dobot_async.cli.family.Family`.
         fleet: A `dobot_async.fleet.families.Family`.
         program: A `dobot_async.program.Vocabulary`.
+        replay: A `dobot_async.traces.replay.Retime`, for an arm that tells of its own clock.
     """
 
     models: tuple[str, ...] = ()
@@ -52,6 +53,7 @@ class Family:
     cli: str = ""
     fleet: str = ""
     program: str = ""
+    replay: str = ""
 
 
 class Parts(Mapping[str, T], Generic[T]):

@@ -15,6 +15,7 @@ from dobot_async._core.util.arguments import check_choice, check_duration, check
 from dobot_async._core.util.tasks import Cleanup, run_shielded
 from dobot_async._core.util.urls import hidden
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTimeout
+from dobot_async.traces.recorder import Recording, recorded
 from dobot_async.transports import open_transport
 
 __all__ = ["arm_session", "check_options", "open_in_time", "run_owned"]
@@ -75,6 +76,7 @@ async def arm_session(
     build: Callable[[Transport, str], S],
     *,
     stop_on_error: bool,
+    recording: Recording | None = None,
 ) -> AsyncGenerator[S]:
     """Connect to an arm, hold it for the length of a block, and leave it.
 
@@ -84,19 +86,31 @@ async def arm_session(
         reopen: Opens the way to a URL.
         build: Makes the arm of a transport, and of the URL by which the same arm can be reached again.
         stop_on_error: Stop the arm when the block is left by an error or a cancellation.
+        recording: Where to write down what goes over the connection.
     """
-    loop = asyncio.get_running_loop()
-    deadline = loop.time() + timeout
-    transport = await reopen(url)
-    arm = build(transport, getattr(transport, "url", None) or url)
-    try:
-        await arm.greet(max(deadline - loop.time(), min(timeout, LEAST)))
-    except BaseException:
-        await run_shielded(close(arm))
-        raise
+    with recorded(recording, url) as recorder:
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + timeout
+        transport = await reopen(url)
+        arm = build(transport, getattr(transport, "url", None) or url)
+        if recorder:
+            recorder.watch(arm.link, arm.queue)
 
+        try:
+            await arm.greet(max(deadline - loop.time(), min(timeout, LEAST)))
+        except BaseException:
+            await run_shielded(close(arm))
+            raise
+
+        async with left(arm, stop_on_error=stop_on_error):
+            yield arm
+
+
+@asynccontextmanager
+async def left(arm: Session, *, stop_on_error: bool) -> AsyncGenerator[None]:
+    """Leave an arm when the block ends: stop it if that is wanted and the block failed, and close its connection."""
     try:
-        yield arm
+        yield
     except BaseException as error:
         if stop_on_error:
             cleanup = arm.link.cleanup

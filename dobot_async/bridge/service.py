@@ -34,6 +34,7 @@ from dobot_async.bridge.desk import Refused, Request
 from dobot_async.bridge.lease import Lease
 from dobot_async.bridge.limits import Allowance, Limits
 from dobot_async.bridge.line import Line
+from dobot_async.bridge.standstill import Standstill
 from dobot_async.errors import ProtocolError, ReplyTimeout
 
 __all__ = ["Bridge", "BridgeEvent"]
@@ -100,7 +101,8 @@ class Bridge(Generic[F]):
         self._clients: set[Client[F]] = set()
         self._ended = False
         self._line = Line(link, family)
-        self._lease = Lease(self._line, family, takeover=takeover, on_vanish=on_vanish, cut=self.cut, tell=self._tell)
+        leave = Standstill(self._line, family, self._tell).reach if on_vanish == "stop" else let_finish
+        self._lease = Lease(takeover=takeover, leave=leave, cut=self.cut, tell=self._tell)
         self._farewells: set[asyncio.Task[None]] = set()
         now = asyncio.get_running_loop().time
         self._bounds = {what: Allowance(rate, now, most=BURST) for what, rate in TOLD.items()}
@@ -323,3 +325,7 @@ class Bridge(Generic[F]):
         event = BridgeEvent(what, printable(name), printable(detail))
         self.events.publish(event)
         logger.info("%s", event)
+
+
+async def let_finish(_: object) -> None:
+    """Do nothing to the arm when its mover has gone."""

@@ -6,6 +6,7 @@ import asyncio
 import itertools
 import re
 from collections.abc import Callable, Collection, Mapping
+from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,15 +15,13 @@ import anyio
 
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.arms.base import Arm
-from dobot_async.cli.arms import FAMILIES
-from dobot_async.cli.cell_program import word_of
-from dobot_async.cli.trace import Trace, TraceFile, traced
 from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell
 from dobot_async.fleet.families import family_of
 from dobot_async.fleet.seat import Member
+from dobot_async.traces import TraceFile
 
-__all__ = ["Reading", "kind_of", "observe", "read", "told_by", "trace_of"]
+__all__ = ["Reading", "joined_alone", "observe", "read", "told_by"]
 
 RETRY = 1.0  # seconds until an arm that did not answer is tried again
 SHORT = re.compile(r"(joint \d+: )?[^:]*")  # of an alarm: cause and remedy would fill the screen
@@ -56,15 +55,14 @@ class Reading:
         return name, self.family, tool or "-", alarms or "none", self.error or "good"
 
 
-def trace_of(trace: TraceFile, name: str, member: Member[Any]) -> Trace:
-    """What tells a trace of the frames of one arm."""
-    return Trace(trace, FAMILIES[word_of(member)].describe, arm=name)
-
-
-def kind_of(name: str, member: Member[Any], trace: TraceFile | None) -> Any:
-    """What connects to an arm that is asked for itself."""
-    kind = family_of(member.kind).kind
-    return traced(kind, trace_of(trace, name, member)) if trace else kind
+def joined_alone(
+    name: str, member: Member[Any], trace: TraceFile | None, *, control: bool
+) -> AbstractAsyncContextManager[Any]:
+    """Connects to an arm that is asked for itself."""
+    record = {"record": trace.named(name)} if trace else {}
+    options = {**member.options, "control": control, "queue": "keep", **record}
+    found: AbstractAsyncContextManager[Any] = family_of(member.kind).kind.connect(member.url, **options)
+    return found
 
 
 async def read(member: Member[Any], arm: Arm) -> Reading:
@@ -102,10 +100,10 @@ async def observe(
             await anyio.sleep(1 / rate)
 
     tasks = [asyncio.create_task(watched())]
-    tasks += [
-        asyncio.create_task(follow(member, kind_of(name, member, trace), 1 / rate, partial(note, name)))
-        for name, member in cell.members.items()
-    ]
+    for name, member in cell.members.items():
+        connected = partial(joined_alone, name, member, trace, control=False)
+        tasks.append(asyncio.create_task(follow(connected, member, 1 / rate, partial(note, name))))
+
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
@@ -123,12 +121,16 @@ async def joined(tasks: Collection[asyncio.Task[None]]) -> None:
     await asyncio.wait(tasks)
 
 
-async def follow(member: Member[Any], kind: Any, interval: float, note: Callable[[Reading], None]) -> None:
+async def follow(
+    connected: Callable[[], AbstractAsyncContextManager[Any]],
+    member: Member[Any],
+    interval: float,
+    note: Callable[[Reading], None],
+) -> None:
     """Notes what one arm tells, for ever."""
-    options = {**member.options, "control": False, "queue": "keep"}
     while True:
         try:
-            async with kind.connect(member.url, **options) as arm:
+            async with connected() as arm:
                 while True:
                     note(await read(member, arm))
                     await anyio.sleep(interval)

@@ -43,7 +43,6 @@ class Family:
         jog: Jogs in one of the `directions`, for so many seconds.
         directions: What a jog can be called.
         suction: Switches the pump.
-        describe: Says what a trace says of a frame.
         pieces: Finds the frames in bytes.
         numbers: How many numbers a move has at most.
         alarms: Whether it has `get_alarms` and `clear_alarms`.
@@ -60,7 +59,6 @@ class Family:
     jog: Callable[[Any, Any, float], Awaitable[None]]
     directions: Mapping[str, Any]
     suction: Callable[[Any, bool], Awaitable[None]]
-    describe: Callable[..., Mapping[str, Any]]
     pieces: Pieces
     numbers: int = 4
     alarms: bool = False

@@ -162,10 +162,13 @@ def keys_of(stream: Any = None) -> Generator[Keys]:
     could not stop an arm.
 
     Raises:
-        OSError: It is no terminal.
+        OSError: It is no terminal, or not one of POSIX.
     """
-    import termios
-    import tty
+    try:
+        import termios
+        import tty
+    except ImportError:
+        raise OSError("keys need a POSIX terminal, which this system has not") from None
 
     descriptor = (stream or sys.stdin).fileno()
     before = termios.tcgetattr(descriptor)

@@ -42,8 +42,10 @@ COMMANDS = {
     "home": ("dobot_async.cli.commands.basics:home", "Drive home, which calibrates the arm."),
     "info": ("dobot_async.cli.commands.basics:info", "Tell who the arm is."),
     "jog": ("dobot_async.cli.commands.basics:jog", "Jog in a direction for a time."),
+    "mcp": ("dobot_async.cli.commands.mcp:mcp", "Give an arm to language models, by MCP."),
     "monitor": ("dobot_async.cli.commands.monitor:monitor", "Watch pose, queue and alarms."),
     "move": ("dobot_async.cli.commands.basics:move", "Move the tool to a point."),
+    "mqtt": ("dobot_async.cli.commands.mqtt:mqtt", "Tell a message broker of an arm, for Home Assistant."),
     "play": ("dobot_async.cli.commands.teach:play_recording", "Play what an arm was taught."),
     "pose": ("dobot_async.cli.commands.basics:pose", "Tell where tool and joints are, in mm and degrees."),
     "run": ("dobot_async.cli.commands.program:run_program", "Run a program file."),
@@ -54,6 +56,7 @@ COMMANDS = {
     "write": ("dobot_async.cli.commands.drawing:write_line", "Write a text with a pen."),
     "teleop": ("dobot_async.cli.commands.teleop:teleop", "Lead the arm by keys, or by targets from a pipe."),
     "teach": ("dobot_async.cli.commands.teach:teach", "Teach the arm, and keep that in a file."),
+    "trace": ("dobot_async.cli.commands.traces:trace", "Look at a trace: lines, figures, curves."),
     "wifi": ("dobot_async.cli.commands.wifi:set_up_wifi", "Bring an arm on USB into a Wi-Fi."),
     "panel": ("dobot_async.cli.commands.panel:panel", "Show arms in the browser, and move them there."),
 }
@@ -152,7 +155,7 @@ def global_options() -> list[click.Option]:
             ["--trace"],
             type=click.Path(dir_okay=False, writable=True, allow_dash=True),
             metavar="FILE",
-            help="Write every frame to and from the arm to FILE, decoded, one JSON object a line; - is standard error.",
+            help="Record what goes over the connection into FILE, one JSON object a line; - is standard error.",
         ),
     ]
 

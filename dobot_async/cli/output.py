@@ -7,19 +7,18 @@ was asked for. rich is imported when something is drawn.
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, fields, is_dataclass
-from enum import Enum
+from dataclasses import dataclass
 from typing import Any
 
 import click
 
+from dobot_async._core.util.plain import plain
 from dobot_async.errors import ArmAlarm
 
-__all__ = ["Output", "plain", "words"]
+__all__ = ["Output", "words"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,27 +112,6 @@ class Output:
 
         with Live(auto_refresh=False) as live:
             yield draw
-
-
-def plain(value: Any) -> Any:
-    """Returns a value as JSON can hold it: dataclasses as objects, enums by name, bytes as hex."""
-    if is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-
-    if isinstance(value, dict):
-        return {key: plain(each) for key, each in value.items()}
-
-    if isinstance(value, (list, tuple)):
-        return [plain(each) for each in value]
-
-    if isinstance(value, Enum):
-        return value.name
-
-    if isinstance(value, bytes):
-        return value.hex(" ")
-
-    # JSON has no word for these.
-    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def words(value: Any) -> str:

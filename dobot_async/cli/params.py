@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, cast
 
 import click
 
+from dobot_async._core.util.hosts import host_and_port
 from dobot_async.cli.failures import WrongFile
 from dobot_async.program.text import LARGEST, read_text
 
@@ -19,6 +20,7 @@ __all__ = [
     "ABOVE_ZERO",
     "DURATION",
     "FINITE",
+    "HOST_AND_PORT",
     "NOT_BELOW_ZERO",
     "PERCENT",
     "PROGRAM",
@@ -52,6 +54,22 @@ class Place(click.ParamType[tuple[str, int]]):
             self.fail(f"{value!r} is no IPv4 address such as 192.168.1.255, or 192.168.1.255:{PORT}", param, ctx)
 
         return address, port
+
+
+class HostPort(click.ParamType[tuple[str, int]]):
+    """Where to listen: HOST:PORT."""
+
+    name = "host:port"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, int]:
+        """Reads HOST:PORT."""
+        if isinstance(value, tuple):
+            return value
+
+        try:
+            return host_and_port(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
 
 
 class FiniteRange(click.FloatRange):
@@ -119,6 +137,7 @@ PROGRAM = TextFile()
 EVERY = FiniteRange()
 ABOVE_ZERO = FiniteRange(0, min_open=True)
 FINITE = FiniteNumber()
+HOST_AND_PORT = HostPort()
 NOT_BELOW_ZERO = FiniteRange(0)
 PERCENT = FiniteRange(0, 100, min_open=True)
 DURATION = FiniteRange(0, max=MOST_SECONDS)

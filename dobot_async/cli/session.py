@@ -22,7 +22,7 @@ from dobot_async.cli.credentials import with_token
 from dobot_async.cli.failures import Interrupted
 from dobot_async.cli.family import Family
 from dobot_async.cli.output import Output
-from dobot_async.cli.trace import Trace, traced, tracing
+from dobot_async.cli.trace import tracing
 from dobot_async.program import VOCABULARIES, Vocabulary
 from dobot_async.transports import SCHEMES
 
@@ -116,8 +116,9 @@ class Session:
         """Connects to the session's arm, or to a URL, with the trace that was asked for."""
         url = url or self.target()
         with tracing(self.trace) as trace:
-            kind = traced(self.family.kind, Trace(trace, self.family.describe)) if trace else self.family.kind
-            async with kind.connect(url, control=control, queue=queue, on_error=on_error) as arm:
+            record = {"record": trace} if trace else {}
+            kind = self.family.kind
+            async with kind.connect(url, control=control, queue=queue, on_error=on_error, **record) as arm:
                 self.commanding = control and on_error == "stop"
                 yield arm
 

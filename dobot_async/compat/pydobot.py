@@ -24,6 +24,7 @@ __all__ = ["MODE_PTP", "Alarm", "Dobot", "DobotException", "Joints", "PTPMode", 
 DobotException = DobotError
 MODE_PTP = PTPMode
 enums = SimpleNamespace(PTPMode=PTPMode)
+"""pydobot's module of numbers."""
 
 
 class Dobot(BaseDobot):

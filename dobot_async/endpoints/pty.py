@@ -13,11 +13,21 @@ __all__ = ["PseudoTerminal", "on_pty"]
 
 P = TypeVar("P", bound=Peer)
 BUFFER = 1 << 16
+NONE_HERE = "this system has no pseudo-terminals, which need POSIX: listen at tcp://127.0.0.1:0 instead"
 LOOK = 0.02  # seconds between two looks at whether somebody has opened it: no system call tells it
 
 
 async def on_pty(host: Host[Any], stack: AsyncExitStack, *, lasting: bool = True) -> str:
-    """A serial port; returns its URL. See `PseudoTerminal`."""
+    """A serial port; returns its URL. See `PseudoTerminal`.
+
+    Raises:
+        ValueError: This system has no pseudo-terminals.
+    """
+    try:
+        import termios  # noqa: F401, PLC0415 - Windows has neither it nor what follows
+    except ImportError:
+        raise ValueError(NONE_HERE) from None
+
     port = PseudoTerminal(host, lasting=lasting)
     stack.callback(port.close)
     return f"serial://{port.path}"

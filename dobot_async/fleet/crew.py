@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncGenerator, Collection, Mapping
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
 from typing import Any, Generic, Literal, Self, TypeVar
 
 from dobot_async._core.queue.epoch import Epoch
@@ -20,6 +20,7 @@ from dobot_async.fleet.claims import Party
 from dobot_async.fleet.seat import Member, Seat, tell_to_stop
 from dobot_async.fleet.work import ended, named, on_the_way_out
 from dobot_async.fleet.zones import Zones
+from dobot_async.traces.recorder import shared
 
 __all__ = ["Crew", "OnFailure"]
 
@@ -53,16 +54,28 @@ class Crew(Generic[A]):
 
     @asynccontextmanager
     async def _connected(self, options: Mapping[str, Any]) -> AsyncGenerator[Self]:
-        """Holds all arms, each in a task of its own, for the length of a block."""
+        """Holds all arms for the length of a block; a trace of all of them is one file."""
+        given = {name: dict(options) for name in self._seats}
+        with ExitStack() as stack:
+            if options.get("record") is not None:
+                file = stack.enter_context(shared(options["record"]))
+                given = {name: {**each, "record": file.named(name)} for name, each in given.items()}
+
+            async with self._held(given):
+                yield self
+
+    @asynccontextmanager
+    async def _held(self, options: Mapping[str, Mapping[str, Any]]) -> AsyncGenerator[None]:
+        """Holds all arms, each in a task of its own, with its own options, for the length of a block."""
         leave = asyncio.Event()
         ready = {name: asyncio.get_running_loop().create_future() for name in self._seats}
         hosts = {
-            asyncio.create_task(host(seat, options, ready[name], leave), name=f"dobot_async {name}"): name
+            asyncio.create_task(host(seat, options[name], ready[name], leave), name=f"dobot_async {name}"): name
             for name, seat in self._seats.items()
         }
         try:
             await all_ready(hosts, ready.values())
-            yield self
+            yield
         except BaseException as error:
             self._leaving = True
             tell_to_stop(seat for seat in self._seats.values() if seat.stops_on_error)

@@ -56,6 +56,12 @@ class Unwatched:
         """Do nothing."""
         yield
 
+    def note(self, motion: Motion) -> None:
+        """Do nothing."""
+
+    def count(self, error: DobotError | None) -> None:
+        """Do nothing: it is no motion of the queue."""
+
 
 @asynccontextmanager
 async def follow_target(

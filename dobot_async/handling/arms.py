@@ -16,6 +16,7 @@ from dobot_async.arms.mycobot.params import MoveMode
 from dobot_async.arms.mycobot.pose import CobotPose
 from dobot_async.arms.ultraarm import commands as u
 from dobot_async.arms.ultraarm.arm import UltraArm
+from dobot_async.arms.ultraarm.verbs import SPEED, check_speed
 from dobot_async.grid import GridPlace
 from dobot_async.grid import place as to_place
 
@@ -50,7 +51,7 @@ class Hand:
 
     Attributes:
         title: What it is called.
-        straight: Moves to a place along a straight line.
+        straight: Moves to a place along a straight line; takes what `move_to` takes besides.
         check: Raises ValueError for x, y, z that it cannot reach.
         settle: Seconds that a tool needs after its verb has returned.
         release: Lets go, where that is more than the verb with False.
@@ -58,7 +59,7 @@ class Hand:
     """
 
     title: str
-    straight: Callable[[Any, Any], Awaitable[None]]
+    straight: Callable[..., Awaitable[None]]
     check: Callable[[Any, Any], None]
     settle: Mapping[str, float]
     release: Mapping[str, Callable[[Any], Awaitable[None]]] = field(
@@ -93,27 +94,41 @@ def check_ultraarm(arm: UltraArm, target: Any) -> None:
     arm.limits.check(u.CoordsMove(target.x, target.y, target.z))
 
 
-async def straight_ultraarm(arm: UltraArm, target: Any) -> None:
+async def straight_magician(arm: Any, target: Any, **more: Any) -> None:
+    """MOVL."""
+    await arm.move_to(*to_arguments(target), **{"mode": PTPMode.MOVL_XYZ, **more})
+
+
+async def straight_mycobot(arm: Any, target: Any, **more: Any) -> None:
+    """LINEAR."""
+    await arm.move_to(*to_arguments(target), **{"mode": MoveMode.LINEAR, **more})
+
+
+async def straight_other(arm: Any, target: Any, **more: Any) -> None:
+    """As the arm goes."""
+    await arm.move_to(*to_arguments(target), **more)
+
+
+async def straight_ultraarm(arm: UltraArm, target: Any, *, speed: float | None = SPEED) -> None:
     """G1: with G0 the joints go their own ways."""
-    value = u.CoordsMove(target.x, target.y, target.z, getattr(target, "e", None), f=SLOWLY)
+    value = u.CoordsMove(target.x, target.y, target.z, getattr(target, "e", None), f=check_speed(speed))
     await arm.perform(u.MOVE_LINE, value, None)
 
 
-SLOWLY = 50.0  # mm/s, what `move_to` has
 AIR, FINGERS = 0.3, 0.6
 """Seconds: a cup holds 0.2 s after its valve, a gripper 0.5 s, and the air is not to be the slower one for once."""
 
 HANDS: Mapping[type, Hand] = {
     Magician: Hand(
         "a Magician",
-        lambda arm, target: arm.move_to(*to_arguments(target), mode=PTPMode.MOVL_XYZ),
+        straight_magician,
         check_magician,
         {"suction": AIR, "gripper": FINGERS},
         {"suction": lambda arm: arm.suction(False, pump=False)},
     ),
     MyCobot: Hand(
         "a myCobot",
-        lambda arm, target: arm.move_to(*to_arguments(target), mode=MoveMode.LINEAR),
+        straight_mycobot,
         check_mycobot,
         {"gripper": 0.0},  # its verb returns when the fingers rest
         lacks=frozenset({"suction"}),
@@ -122,7 +137,7 @@ HANDS: Mapping[type, Hand] = {
 }
 OTHER = Hand(
     "the arm",
-    lambda arm, target: arm.move_to(*to_arguments(target)),
+    straight_other,
     lambda arm, target: None,  # noqa: ARG005 - nothing is known of it
     {"suction": AIR, "gripper": FINGERS},
 )
@@ -138,13 +153,13 @@ def settle_time(arm: Arm, tool: str) -> float:
     return hand_of(arm).settle.get(tool, 0.0)
 
 
-async def move_straight(arm: Arm, where: Any) -> None:
+async def move_straight(arm: Arm, where: Any, **moves: Any) -> None:
     """Move the tool along a straight line to a place: x, y, z in mm, or a pose of the arm's family.
 
     Raises:
         DobotError: As the arm's `move_to`.
     """
-    await hand_of(arm).straight(arm, target_of(where))
+    await hand_of(arm).straight(arm, target_of(where), **moves)
 
 
 def gripper_holds(arm: MyCobot, *, least: float = CLOSED) -> Check:

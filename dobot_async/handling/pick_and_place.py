@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, SupportsFloat
 
@@ -73,6 +73,7 @@ class Handling:
         tool: With what.
         seconds: That the tool needs.
         check_stop: Raises if the arm was stopped since this was planned.
+        moves: What each motion takes besides.
     """
 
     arm: Any
@@ -81,6 +82,7 @@ class Handling:
     tool: Tool
     seconds: float
     check_stop: Callable[[], None]
+    moves: Mapping[str, Any]
 
     async def switch(self, *, take: bool) -> None:
         """Let the tool take, or let go, and return when it has."""
@@ -100,15 +102,15 @@ class Handling:
     async def approach(self) -> None:
         """Go above the place."""
         self.check_stop()
-        await self.arm.move_to(*to_arguments(self.above))
+        await self.arm.move_to(*to_arguments(self.above), **self.moves)
 
     async def touch(self, *, take: bool) -> None:
         """Go down, let the tool take or let go, and come up."""
         self.check_stop()
-        await move_straight(self.arm, self.target)
+        await move_straight(self.arm, self.target, **self.moves)
         await self.switch(take=take)
         self.check_stop()
-        await move_straight(self.arm, self.above)
+        await move_straight(self.arm, self.above, **self.moves)
 
 
 def planned(
@@ -118,6 +120,7 @@ def planned(
     approach: SupportsFloat,
     travel_z: SupportsFloat | None,
     seconds: SupportsFloat | None,
+    moves: Mapping[str, Any],
 ) -> Handling:
     """Check everything, and send nothing; raise ValueError, TypeError or UnsupportedError."""
     if not callable(tool):
@@ -146,7 +149,7 @@ def planned(
 
     usual = AIR if callable(tool) else hand.settle[tool]
     needed = usual if seconds is None else check_duration(seconds, "settle")
-    return Handling(arm, target, above, tool, needed, stop_check(arm))
+    return Handling(arm, target, above, tool, needed, stop_check(arm), moves)
 
 
 async def holds_part(check: Check | None, default: bool) -> bool:
@@ -167,6 +170,7 @@ async def pick(
     travel_z: float | None = None,
     settle: float | None = None,
     check: Check | None = None,
+    **moves: Any,
 ) -> None:
     """Pick a part up: from above the place straight down, and straight up again.
 
@@ -181,6 +185,7 @@ async def pick(
             none for one whose verb returns when it rests.
         check: Tells whether there is a part, by a sensor or otherwise: a function, async or not. It is called when the
             arm is above the place again. `gripper_holds(arm)` is one.
+        moves: What `move_to` of the arm takes besides the place, such as speed=20 of a myCobot or an ultraArm.
 
     Raises:
         PartMissing: `check` says so. The arm is above the place, and the tool has let go.
@@ -188,7 +193,7 @@ async def pick(
         UnsupportedError: The arm has no such tool; nothing was sent.
         DobotError: As the verbs of the arm.
     """
-    handling = planned(arm, where, tool, approach, travel_z, settle)
+    handling = planned(arm, where, tool, approach, travel_z, settle, moves)
     await _pick(handling, check)
 
 
@@ -201,6 +206,7 @@ async def place(
     travel_z: float | None = None,
     settle: float | None = None,
     check: Check | None = None,
+    **moves: Any,
 ) -> None:
     """Put down what the tool holds: `pick`, the other way round.
 
@@ -212,6 +218,7 @@ async def place(
         travel_z: As for `pick`.
         settle: Seconds that the tool needs to let go; as for `pick`.
         check: As for `pick`. It is asked above the place, before the tool goes down, and once more at the end.
+        moves: As for `pick`.
 
     Raises:
         PartMissing: There is none above the place any more: it was lost on the way. The tool has let go.
@@ -220,7 +227,7 @@ async def place(
         UnsupportedError: As `pick`.
         DobotError: As the verbs of the arm.
     """
-    handling = planned(arm, where, tool, approach, travel_z, settle)
+    handling = planned(arm, where, tool, approach, travel_z, settle, moves)
     await _place(handling, check)
 
 
@@ -234,6 +241,7 @@ async def pick_and_place(
     travel_z: float | None = None,
     settle: float | None = None,
     check: Check | None = None,
+    **moves: Any,
 ) -> None:
     """Carry a part from one place to another; both are checked before the arm moves.
 
@@ -246,6 +254,7 @@ async def pick_and_place(
         travel_z: As for `pick`.
         settle: As for `pick`.
         check: As for `pick`, and for `place`.
+        moves: As for `pick`.
 
     Raises:
         PartMissing: There was none at the source, or it was lost on the way: `place` tells which.
@@ -254,7 +263,7 @@ async def pick_and_place(
         UnsupportedError: As `pick`.
         DobotError: As the verbs of the arm.
     """
-    picking, placing = (planned(arm, each, tool, approach, travel_z, settle) for each in (source, target))
+    picking, placing = (planned(arm, each, tool, approach, travel_z, settle, moves) for each in (source, target))
     await _pick(picking, check)
     await _place(placing, check)
 

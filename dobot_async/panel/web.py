@@ -17,11 +17,13 @@ from aiohttp import WSMsgType, web
 from dobot_async._core.util.tasks import cancel_and_join, run_shielded
 from dobot_async._core.util.text import printable
 from dobot_async.bridge.limits import Allowance
+from dobot_async.metrics import CONTENT_TYPE
 from dobot_async.panel.access import HEADERS, Access, Role, TurnedAway
 from dobot_async.panel.answers import as_json, plain, safe, served
 from dobot_async.panel.desk import Desk
 from dobot_async.panel.doorkeeper import Doorkeeper
 from dobot_async.panel.drawings import MODES
+from dobot_async.panel.figures import panel_metrics
 from dobot_async.panel.pages import Pages
 from dobot_async.panel.problems import Refusal, told
 from dobot_async.panel.session import Session
@@ -30,6 +32,7 @@ __all__ = ["Web"]
 
 logger = logging.getLogger("dobot_async.panel")
 STATIC = Path(__file__).parent / "static"
+METRICS = "/metrics"
 LARGEST_MESSAGE = 4096  # bytes, in characters of a page
 LARGEST_FILE = 4 * 2**20
 LARGEST_RECORDING = 2**20
@@ -74,6 +77,7 @@ class Web:
                 web.get("/ws", self._socket),
                 web.post("/files", self._upload),
                 web.get("/recordings/{name}", self._download),
+                web.get(METRICS, self._metrics),
                 web.post("/recordings/{name}", self._load),
             ]
         )
@@ -145,6 +149,9 @@ class Web:
     def _role(self, request: web.Request) -> Role:
         """Return what who asks may do; raise TurnedAway for strangers."""
         role = self._access.role_of_cookie(request.cookies.get(self._access.cookie_name, ""))
+        if role is None and request.path == METRICS:  # Prometheus has no cookies
+            role = self._access.role_of_token(request.headers.get("Authorization", "").removeprefix("Bearer "))
+
         if role is None:
             raise TurnedAway(401, "it has no cookie", NOT_IN)
 
@@ -175,6 +182,11 @@ class Web:
 
     async def _static(self, request: web.Request) -> web.Response:
         return served(self._pages.get(request.match_info["name"]), request)
+
+    async def _metrics(self, _request: web.Request) -> web.Response:
+        """Give out the figures of the arms; needs the extra `metrics`."""
+        text = await panel_metrics(self._desk)
+        return web.Response(body=text, headers={"Content-Type": CONTENT_TYPE})
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         """Serve a page until it goes, or does not answer any more."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 from dobot_async import Motion as AsyncMotion
@@ -47,6 +47,12 @@ class QueueTwin(Twin[A]):
     """A queue: each verb returns a Motion once the arm has accepted it."""
 
     __slots__ = ()
+
+    @property
+    def outcomes(self) -> Mapping[str, int]:
+        """How many motions ended, by how: "done", or the name of the error that they raise."""
+        queue: Any = self.asynchronous
+        return dict(queue.outcomes)
 
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Motion:
         """Queue a command."""

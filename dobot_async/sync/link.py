@@ -6,6 +6,7 @@ from typing import Any, Generic, TypeVar
 
 from dobot_async import ConnectionLost, LinkState, LinkStats
 from dobot_async import Link as AsyncLink
+from dobot_async._core.protocol.contract import LineLimits
 from dobot_async._core.util.events import Events as AsyncEvents
 from dobot_async._core.util.events import Watched as AsyncWatched
 from dobot_async._core.util.hooks import Hooks
@@ -60,9 +61,19 @@ class Link(Twin[AsyncLink[Any]]):
         return self.asynchronous.outages
 
     @property
+    def limits(self) -> LineLimits:
+        """What the transport can carry at a time; it may change when the link is reopened."""
+        return self.asynchronous.limits
+
+    @property
     def stats(self) -> LinkStats:
         """A snapshot of what went over the link so far."""
         return self.asynchronous.stats
+
+    @property
+    def round_trip(self) -> float | None:
+        """Seconds that an answer takes on the average; None before the first one."""
+        return self.asynchronous.round_trip
 
     @property
     def state(self) -> Watched[LinkState]:

@@ -30,6 +30,7 @@ from dobot_async.sync.link import Link
 from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.twin import Block, Items, Twin, same
+from dobot_async.traces.recorder import Record
 
 __all__ = ["Batch", "Magician", "MagicianQueue", "Program", "WiFi"]
 
@@ -250,6 +251,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
         reconnect: bool = False,
         reply_timeout: float | tuple[float, float] = (0.02, 0.5),
         workspace: Workspace | Box | Cylinder | None = None,
+        record: Record | None = None,
     ) -> AbstractContextManager[Self]:
         """Connects to an arm for the length of a block.
 
@@ -272,6 +274,8 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
             workspace: Where the tool may be, in mm and the arm's own coordinates: a `Workspace`, or a Box or Cylinder
                 that is allowed. Targets, and ways as far as they are known, raise OutsideWorkspace, a ValueError,
                 before anything is sent; docs/workspace.md says what is looked at.
+            record: Where to write down what goes over the connection, for the length of the block: a path, or a
+                `dobot_async.traces.TraceFile`. Passwords are left out; see docs/trace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -289,6 +293,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
                 reconnect=reconnect,
                 reply_timeout=reply_timeout,
                 workspace=workspace,
+                record=record,
             ),
             cls,
             str(url),

@@ -29,6 +29,7 @@ from dobot_async.sync.link import Link
 from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.twin import Block, same
+from dobot_async.traces.recorder import Record
 
 __all__ = ["CobotBatch", "CobotQueue", "MyCobot"]
 
@@ -173,6 +174,7 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         limits: Mapping[str, Range] | None = None,
         gap: float = 0.02,
         workspace: Workspace | Box | Cylinder | None = None,
+        record: Record | None = None,
     ) -> AbstractContextManager[Self]:
         """Connect to an arm for the length of a block.
 
@@ -201,6 +203,8 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
                 Cylinder that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is
                 sent, or CommandRejected where it shows when its turn comes. Motions given in joints are not looked at;
                 see docs/workspace.md.
+            record: Where to write down what goes over the connection, for the length of the block: a path, or a
+                `dobot_async.traces.TraceFile`. Passwords are left out; see docs/trace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -223,6 +227,7 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
                 limits=limits,
                 gap=gap,
                 workspace=workspace,
+                record=record,
             ),
             cls,
             str(url),

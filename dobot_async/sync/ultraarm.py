@@ -28,6 +28,7 @@ from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.streams import GCodeRun
 from dobot_async.sync.twin import Block, same
+from dobot_async.traces.recorder import Record
 
 __all__ = ["UltraArm", "UltraArmBatch", "UltraArmQueue"]
 
@@ -174,6 +175,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
         home_switches: tuple[int, int, int] | None = (1, 1, 1),
         on_stop: Literal["release", "finish"] = "release",
         workspace: Workspace | Box | Cylinder | None = None,
+        record: Record | None = None,
     ) -> AbstractContextManager[Self]:
         """Connect to an arm for the length of a block.
 
@@ -203,6 +205,8 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
                 that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is sent, or
                 CommandRejected where it shows when its turn comes. Motions given in joints are not looked at; see
                 docs/workspace.md.
+            record: Where to write down what goes over the connection, for the length of the block: a path, or a
+                `dobot_async.traces.TraceFile`. Passwords are left out; see docs/trace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -223,6 +227,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
                 home_switches=home_switches,
                 on_stop=on_stop,
                 workspace=workspace,
+                record=record,
             ),
             cls,
             str(url),

@@ -12,7 +12,7 @@ from dobot_async._core.util.urls import hidden
 __all__ = ["SCHEMES", "Transport", "open_transport"]
 
 SCHEMES = {
-    "serial": ("dobot_async.transports.serial", "serial:///dev/ttyUSB0, serial://COM3 (?baud=115200)"),
+    "serial": ("dobot_async.transports.serial_port", "serial:///dev/ttyUSB0, serial://COM3 (?baud=115200)"),
     "udp": ("dobot_async.transports.network", "udp://192.168.1.20 (port 8899)"),
     "tcp": ("dobot_async.transports.network", "tcp://host:port"),
     "ws": ("dobot_async.transports.websocket", "ws://host:port (a bridge; ?token=)"),
@@ -23,6 +23,7 @@ SCHEMES = {
     ),
     "ble": ("dobot_async.transports.ble.opening", "ble://NAME, ble://ADDRESS, ble: (the first arm in range)"),
     "sim": ("dobot_async.simulator.url", "sim: (?speed=10&seed=1&loss=0.05&latency=0.01)"),
+    "replay": ("dobot_async.traces.replay", "replay:FILE (an arm that answers as in a trace; ?arm=&connection=)"),
 }
 
 

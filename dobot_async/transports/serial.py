@@ -12,43 +12,29 @@ import os
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from urllib.parse import SplitResult
 
 import serial
 from serial_asyncio import connection_for_serial
 
-from dobot_async._core.protocol.transport import Transport
-from dobot_async.errors import ConnectFailed
 from dobot_async.transports.byte_stream import DRAIN, ByteStreamTransport
-from dobot_async.transports.options import number, options
 
-__all__ = ["SerialTransport", "open_url"]
+__all__ = ["SerialTransport", "open_port"]
 
-BAUD = 115200
-OPTIONS = {"baud": number(int, "bits per second", least=50, most=12_000_000)}
 POLL = 0.005
 POSIX = os.name == "posix"
 
 
-async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 - for `sim:`
-    """Open `serial:///dev/ttyUSB0` or `serial://COM3`, with `?baud=` if it is not 115200."""
-    path = url.netloc + url.path
-    baud = options(url, OPTIONS).get("baud", BAUD)
-    if not path:
-        raise ValueError("expected serial:///dev/ttyUSB0 or serial://COM3")
-
+async def open_port(path: str, baud: int) -> SerialTransport:
+    """Open a port; raise OSError or ValueError if it cannot be opened."""
     port = (Port if POSIX else serial.Serial)(None, baudrate=baud, exclusive=True if POSIX else None)
     port.port = path
     port.dtr = port.rts = False
     try:
         await in_thread(port.open, port.close)
         output, transport = await connection_for_serial(asyncio.get_running_loop(), SerialTransport, port)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError):
         port.close()
-        raise ConnectFailed(
-            f"cannot open {path}: {error}; is the arm plugged in, is this its port, may this user open it "
-            "(group dialout), and is no other program using it?"
-        ) from error
+        raise
 
     # Said here already, for waiting until it is said could be cancelled, and would leave an open port to nobody.
     transport.connection_made(output)

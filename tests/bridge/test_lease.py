@@ -15,6 +15,7 @@ from dobot_async.arms.mycobot.bridge_adapter import BRIDGED, CobotWatch
 from dobot_async.arms.mycobot.frame import Frame
 from dobot_async.arms.mycobot.models import MODELS
 from dobot_async.bridge.lease import Lease
+from dobot_async.bridge.standstill import Standstill
 
 MODEL = MODELS["mycobot280"]
 
@@ -55,14 +56,12 @@ async def test_an_arm_that_seems_to_stand_for_a_moment_is_stopped_before_the_lea
     now = 0.0
     line: Any = FakeLine(spoilt, lost)
     told: list[tuple[str, bool]] = []
-    lease: Lease[Frame] = Lease(
-        line,
-        BRIDGED["mycobot280"],
-        takeover=False,
-        on_vanish="stop",
-        cut=lambda *_: None,
-        tell=lambda what, *_: told.append((what, line.moving)),
-    )
+
+    def tell(what: str, *_: object) -> None:
+        told.append((what, line.moving))
+
+    leave = Standstill(line, BRIDGED["mycobot280"], tell).reach
+    lease: Lease[Any] = Lease(takeover=False, leave=leave, cut=lambda *_: None, tell=tell)
     first: Any = SimpleNamespace(gone=False, name="first", watch=CobotWatch(MODEL, lambda: now))
     second: Any = SimpleNamespace(gone=False, name="second", watch=CobotWatch(MODEL, lambda: now))
     await lease.take(first)

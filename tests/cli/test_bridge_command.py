@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 import threading
+import urllib.request
 from asyncio.subprocess import PIPE, Process
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
@@ -170,3 +171,21 @@ async def test_it_writes_no_trace(tmp_path: Path) -> None:
         _, errors = await process.communicate()
         assert process.returncode == 2
         assert b"no trace" in errors
+
+
+async def test_metrics_are_served_beside_it(sim: Simulation) -> None:
+    async with started(sim.url, TCP, "--metrics", "127.0.0.1:0") as process:
+        await line(process)
+        url = await line(process)
+        page = await asyncio.to_thread(fetched, url)
+        assert 'dobot_link_up{arm="magician"} 1.0' in page
+        assert 'dobot_bridge_clients{arm="magician"} 0.0' in page
+        process.send_signal(signal.SIGINT)
+        output, errors = await process.communicate()
+        assert (process.returncode, output, errors) == (130, b"", b"")
+
+
+def fetched(url: str) -> str:
+    with urllib.request.urlopen(url, timeout=IN_TIME) as answer:
+        text: str = answer.read().decode()
+        return text

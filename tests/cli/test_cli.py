@@ -555,7 +555,7 @@ async def test_decode_reads_as_text() -> None:
 async def test_a_trace_has_every_frame(sim: Simulation, tmp_path: Path) -> None:
     file = tmp_path / "trace"
     answer = (await run("--json", "--url", sim.url, "--trace", str(file), "move", "220", "0", "40")).answer
-    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    lines = [line for line in map(json.loads, file.read_text().splitlines()) if line["kind"] == "frame"]
     out = [line for line in lines if line["direction"] == "out"]
     assert len(out) == sim.arm.counters.requests
     assert len(lines) - len(out) == sim.arm.counters.replies
@@ -575,7 +575,7 @@ async def test_a_trace_that_cannot_be_written_does_not_keep_the_arm_from_moving(
     done = await run("--json", "--url", sim.url, "--trace", "/dev/full", "move", "220", "0", "40")
     assert done.answer["x"] == pytest.approx(220, abs=0.01)
     assert done.errors.count("\n") == 1
-    assert done.errors.startswith("warning: the trace ends here")
+    assert done.errors.startswith("warning: the trace ended early")
 
 
 # --- the demo, terminals, start-up ---

@@ -80,7 +80,7 @@ def test_monitor_and_trace(tmp_path: Path) -> None:
     result = call("mycobot", "--trace", str(file), "monitor", "--count", "2", "--rate", "50")
     assert result.exit_code == 0, result.output
     assert result.output.count("at rest") == 2
-    lines = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+    lines = [line for line in map(json.loads, file.read_text().splitlines()) if line["kind"] == "frame"]
     assert {line["command"] for line in lines} >= {"IsPowerOn", "GetAnglesCoords", "IsMoving"}
     assert lines[0]["raw"] == "fe fe 02 12 fa"
     assert {line["direction"] for line in lines} == {"in", "out"}

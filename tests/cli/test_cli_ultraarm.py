@@ -100,7 +100,7 @@ def test_monitor_and_trace(tmp_path: Path) -> None:
     assert [each["queue_size"] for each in readings] == [0, 0]
     assert readings[0]["coords"]["x"] == 235.55
     assert not readings[0]["moving"]
-    lines = [json.loads(line) for line in trace.read_text().splitlines()]
+    lines = [line for line in map(json.loads, trace.read_text().splitlines()) if line["kind"] == "frame"]
     assert lines[0]["command"] == "M120"
     assert {each["direction"] for each in lines} == {"out", "in"}
     assert "QUEUE SIZE[0]" in lines[1]["value"]

@@ -58,17 +58,23 @@ def test_they_stand_among_the_arguments_of_a_command(tmp_path: Path) -> None:
     assert "GetPose" in file.read_text(encoding="utf-8")
 
 
+def frames_in(trace: Path) -> list[dict[str, Any]]:
+    """The frames of a trace."""
+    lines = map(json.loads, trace.read_text(encoding="utf-8").splitlines())
+    return [line for line in lines if line["kind"] == "frame"]
+
+
 def test_they_stand_behind_the_commands_of_a_cell(tmp_path: Path) -> None:
     cell, trace = tmp_path / "cell.toml", tmp_path / "trace"
     cell.write_text(f'[arms.a]\nurl="{SIM}"\n[arms.b]\nurl="{SIM}"\nfamily="mycobot"\n', encoding="utf-8")
     result = call("cell", str(cell), "status", "--json", "--trace", str(trace))
     assert list(json.loads(result.stdout)["arms"]) == ["a", "b"]
-    lines = [json.loads(line) for line in trace.read_text(encoding="utf-8").splitlines()]
+    lines = frames_in(trace)
     assert {(line["arm"], line["command"]) for line in lines} >= {("a", "GetPose"), ("b", "IsPowerOn")}
     program = tmp_path / "program"
     program.write_text("a: move 220 0 40\nb: joints 10 0 0 0 0 0\n", encoding="utf-8")
     assert call("cell", str(cell), "run", str(program), "--trace", str(trace)).exit_code == 0
-    lines = [json.loads(line) for line in trace.read_text(encoding="utf-8").splitlines()]
+    lines = frames_in(trace)
     assert {(line["arm"], line["command"]) for line in lines} >= {("a", "SetPTPCmd"), ("b", "SendAngles")}
 
 
@@ -143,7 +149,7 @@ def test_what_was_stored_is_what_the_program_says(tmp_path: Path) -> None:
     trace = tmp_path / "trace"
     text = "move 200 0 50\nsuction on\n"
     assert call("run", "-", "--url", SIM, "--download", "--trace", str(trace), text=text).exit_code == 0
-    lines = [json.loads(line) for line in trace.read_text(encoding="utf-8").splitlines()]
+    lines = frames_in(trace)
     sent = [line["command"] for line in lines if line["direction"] == "out"]
     start, stop = sent.index("SetQueuedCmdStartDownload"), sent.index("SetQueuedCmdStopDownload")
     stored = [name for name in sent[start + 1 : stop] if name.startswith(("SetPTP", "SetEnd"))]
@@ -174,12 +180,13 @@ def test_decode_reads_lines_of_text_standard_input_and_files(tmp_path: Path) -> 
 def test_decode_reads_a_trace(tmp_path: Path) -> None:
     trace = tmp_path / "trace"
     assert call("--url", SIM, "--trace", str(trace), "pose").exit_code == 0
-    lines = [json.loads(line) for line in trace.read_text(encoding="utf-8").splitlines()]
+    lines = frames_in(trace)
     pieces = json.loads(call("--json", "decode", "--file", str(trace)).stdout)["pieces"]
     assert [piece["command"] for piece in pieces] == [line["command"] for line in lines]
     assert [piece["direction"] for piece in pieces] == [line["direction"] for line in lines]
     assert "line 1 is no line of a trace" in errors("decode", "-", text="{\n")
-    (masked,) = json.loads(call("--json", "decode", "-", text='{"raw": "aa aa *** 9c 01 ***"}').stdout)["pieces"]
+    secret = '{"kind": "frame", "raw": "aa aa *** 9c 01 ***"}'
+    (masked,) = json.loads(call("--json", "decode", "-", text=secret).stdout)["pieces"]
     assert "left out" in masked["junk"]
 
 
@@ -224,7 +231,7 @@ def test_a_trace_into_a_pipe_whose_reader_stalls_does_not_hold_up_the_arm(tmp_pa
         os.close(reader)
 
     assert done.returncode == 0
-    assert b"warning: the trace ends here" in done.stderr
+    assert b"warning: the trace ended early" in done.stderr
 
 
 def test_a_quit_from_the_terminal_stops_the_arm_as_well() -> None:

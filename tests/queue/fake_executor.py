@@ -13,6 +13,7 @@ from typing import Any
 from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.queue.executor import Entry, Source, alarmed
 from dobot_async._core.queue.keeper import Keeper
+from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
@@ -79,6 +80,7 @@ class FakeExecutor:
     def __init__(self, capacity: int = 1000) -> None:
         self.cleanup = Cleanup("fake:")
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
+        self.on_motion: Hooks[[Motion]] = Hooks()
         self.keeper: Keeper[Any] | None = None
         self.capacity = capacity
         self.dead = False

@@ -14,6 +14,7 @@ from dobot_async._core.protocol.layouts import NOTHING
 from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.queue.executor import Entry, Source
 from dobot_async._core.queue.keeper import Keeper
+from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup
@@ -38,6 +39,7 @@ class FakeExecutor:
     def __init__(self) -> None:
         self.cleanup = Cleanup("fake:")
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
+        self.on_motion: Hooks[[Motion]] = Hooks()
         self.keeper: Keeper[Any] | None = None
         self.taken = self.finished = 0
         self.raised: list[object] = []

@@ -30,8 +30,9 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = "dobot_async.sync"
 INTERNAL = frozenset(
     (
-        *("aclose", "attach", "begin_own_stop", "begin_stop", "beside", "cancel_writer", "declared", "exclusively"),
-        *("fail", "find_goal", "give_up", "goal", "greet", "kept", "leads_anywhere", "leave", "led_by", "look", "next"),
+        *("aclose", "attach", "begin_own_stop", "begin_stop", "beside", "cancel_writer", "count", "declared"),
+        *("exclusively", "fail", "find_goal", "give_up", "goal", "greet", "kept", "leads_anywhere", "leave"),
+        *("led_by", "look", "next", "note", "on_motion"),
         *("no_more_room", "perform", "perform_from_goal", "planned", "prepare", "put_all", "rest", "roaming"),
         *("stopping", "stops_heard", "update", "watch", "watching", "write_on", "writer_ended"),
     )

@@ -1,4 +1,4 @@
-"""Serial ports over pseudo-terminals: the test holds the arm's end."""
+"""Serial ports over pseudo-terminals, by each backend: the test holds the arm's end."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import struct
 import sys
 import threading
+import types
 from collections.abc import AsyncIterator, Iterator
 from contextlib import aclosing, asynccontextmanager, nullcontext
 from typing import Any, cast
@@ -20,12 +21,14 @@ from dobot_async._core.protocol.contract import LinkState
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import Frame, Parser, request
 from dobot_async.errors import ConnectFailed, ConnectionLost
-from dobot_async.transports import open_transport
+from dobot_async.transports import open_transport, serial_port
 from dobot_async.transports import serial as serial_transport
+from dobot_async.transports import serialx as serialx_transport
 
 if sys.platform == "win32":
     pytest.skip("needs pseudo-terminals", allow_module_level=True)
 
+import fcntl
 import termios
 import tty
 
@@ -36,12 +39,13 @@ BUFFER = 1 << 16
 class Terminal:
     """A serial port whose other end is in the hands of the test."""
 
-    def __init__(self) -> None:
+    def __init__(self, backend: str) -> None:
+        self.backend = backend
         self.master, self.slave = os.openpty()
         tty.setraw(self.slave)
         os.set_blocking(self.master, False)
         self.path = os.ttyname(self.slave)
-        self.url = f"serial://{self.path}"
+        self.url = f"serial://{self.path}?backend={backend}"
 
     async def read(self, size: int) -> bytes:
         """Returns exactly so many bytes that the driver sent."""
@@ -84,10 +88,15 @@ async def ready(descriptor: int, *, write: bool) -> None:
     await (anyio.wait_writable(descriptor) if write else anyio.wait_readable(descriptor))
 
 
-@pytest.fixture
-def terminal() -> Iterator[Terminal]:
+MODULES = {"pyserial": serial_transport, "serialx": serialx_transport}
+PYSERIAL = pytest.mark.parametrize("terminal", ["pyserial"], indirect=True)
+SERIALX = pytest.mark.parametrize("terminal", ["serialx"], indirect=True)
+
+
+@pytest.fixture(params=["pyserial", "serialx"])
+def terminal(request: pytest.FixtureRequest) -> Iterator[Terminal]:
     """A port that nobody has opened yet."""
-    terminal = Terminal()
+    terminal = Terminal(request.param)
     yield terminal
     terminal.close()
 
@@ -182,7 +191,7 @@ async def test_what_nobody_reads_is_bounded_and_not_lost(terminal: Terminal) -> 
             await step(1)
 
         await step(100)
-        assert len(transport._buffer) < BUFFER + 2048
+        assert len(transport._buffer) < BUFFER + 8192  # the system hands over so much at a time
         assert not writing.done()
 
         received = b""
@@ -206,13 +215,14 @@ async def test_send_waits_for_a_peer_that_does_not_read(terminal: Terminal) -> N
 # Opening
 
 
-@pytest.mark.parametrize(("option", "speed"), [("", termios.B115200), ("?baud=57600", termios.B57600)])
+@pytest.mark.parametrize(("option", "speed"), [("", termios.B115200), ("&baud=57600", termios.B57600)])
 async def test_the_port_has_the_speed_of_the_url(terminal: Terminal, option: str, speed: int) -> None:
     transport = await open_transport(terminal.url + option, arm="magician")
     assert termios.tcgetattr(terminal.slave)[4:6] == [speed, speed]
     await transport.aclose()
 
 
+@PYSERIAL
 async def test_dtr_and_rts_are_low_before_the_port_opens(terminal: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[tuple[bool, bool, bool]] = []
     real = serial.Serial.open
@@ -227,19 +237,21 @@ async def test_dtr_and_rts_are_low_before_the_port_opens(terminal: Terminal, mon
         assert seen == [(False, False, False), (True, False, False)]
 
 
-async def test_a_missing_port_says_what_to_check() -> None:
+@pytest.mark.parametrize("backend", MODULES)
+async def test_a_missing_port_says_what_to_check(backend: str) -> None:
     with pytest.raises(ConnectFailed, match=r"cannot open /dev/no-such-port: .*is the arm plugged in") as failed:
-        await open_transport("serial:///dev/no-such-port", arm="magician")
+        await open_transport(f"serial:///dev/no-such-port?backend={backend}", arm="magician")
 
     assert isinstance(failed.value, ConnectionError)
     assert isinstance(failed.value.__cause__, OSError)
 
 
-async def test_a_file_that_is_no_port_is_refused(tmp_path: Any) -> None:
+@pytest.mark.parametrize("backend", MODULES)
+async def test_a_file_that_is_no_port_is_refused(backend: str, tmp_path: Any) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"")
     with pytest.raises(ConnectFailed, match="cannot open"):
-        await open_transport(f"serial://{path}", arm="magician")
+        await open_transport(f"serial://{path}?backend={backend}", arm="magician")
 
 
 async def test_a_port_in_use_is_refused(terminal: Terminal) -> None:
@@ -251,6 +263,7 @@ async def test_a_port_in_use_is_refused(terminal: Terminal) -> None:
         pass
 
 
+@PYSERIAL
 async def test_a_port_that_vanishes_while_it_is_opened_is_refused(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -270,6 +283,7 @@ async def test_a_port_that_vanishes_while_it_is_opened_is_refused(
     assert [port.is_open for port in ports] == [False]
 
 
+@PYSERIAL
 @pytest.mark.parametrize("there", [True, False])
 async def test_the_thread_that_opens_has_ended_when_it_is_open(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch, there: bool
@@ -284,7 +298,9 @@ async def test_the_thread_that_opens_has_ended_when_it_is_open(
 
     monkeypatch.setattr(loop, "call_soon_threadsafe", and_then_dawdle)
     with nullcontext() if there else pytest.raises(ConnectFailed):
-        transport = await open_transport(terminal.url if there else "serial:///dev/no-such-port", arm="magician")
+        transport = await open_transport(
+            terminal.url if there else "serial:///dev/no-such-port?backend=pyserial", arm="magician"
+        )
 
     assert "dobot_async open" not in {thread.name for thread in threading.enumerate()}
     if there:
@@ -303,6 +319,7 @@ async def test_opening_may_be_cancelled_anywhere(terminal: Terminal, steps: int)
     await released(terminal)
 
 
+@PYSERIAL
 async def test_opening_that_takes_its_time_blocks_nobody_and_may_be_cancelled(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -411,7 +428,7 @@ async def test_closing_with_unread_data_does_not_hang(terminal: Terminal) -> Non
 async def test_closing_with_unsent_data_does_not_hang(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
-    monkeypatch.setattr(serial_transport, "DRAIN", 0.02)
+    monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 0.02)
     async with opened(terminal) as transport:
         sending = asyncio.create_task(transport.send(bytes(size)))
         await step(10)
@@ -420,13 +437,14 @@ async def test_closing_with_unsent_data_does_not_hang(
         assert sending.exception() is None or isinstance(sending.exception(), anyio.ClosedResourceError)
 
 
+@PYSERIAL
 async def test_closing_a_broken_port_with_unsent_data_does_not_hang(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(port: serial.Serial, size: int) -> bytes:
         raise serial.SerialException("broken")
 
-    monkeypatch.setattr(serial_transport, "DRAIN", 0.02)
+    monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 0.02)
     async with opened(terminal) as transport:
         await transport.send(bytes(BUFFER // 2))
         monkeypatch.setattr(serial_transport.Port, "read", fail)
@@ -455,6 +473,7 @@ async def test_closing_waits_for_a_peer_that_reads(terminal: Terminal) -> None:
         assert received == everything
 
 
+@PYSERIAL
 async def test_closing_waits_for_the_systems_own_buffer(terminal: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     waiting = iter([4096, 2048])
     thrown_away: list[bool] = []
@@ -466,7 +485,7 @@ async def test_closing_waits_for_the_systems_own_buffer(terminal: Terminal, monk
     assert next(waiting, None) is None
     assert not thrown_away
 
-    monkeypatch.setattr(serial_transport, "DRAIN", 0.02)
+    monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 0.02)
     monkeypatch.setattr(serial.Serial, "out_waiting", 1)
     async with opened(terminal):
         pass
@@ -504,7 +523,7 @@ async def test_closing_after_unplugging(terminal: Terminal) -> None:
 async def test_closing_may_be_cancelled_anywhere(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch, unsent: bool
 ) -> None:
-    monkeypatch.setattr(serial_transport, "DRAIN", 60)
+    monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 60)
     for steps in range(6):
         transport = await open_transport(terminal.url, arm="magician")
         if unsent:
@@ -517,9 +536,9 @@ async def test_closing_may_be_cancelled_anywhere(
         if steps:
             await transport.aclose()
         else:
-            monkeypatch.setattr(serial_transport, "DRAIN", 0.02)
+            monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 0.02)
             await transport.aclose()
-            monkeypatch.setattr(serial_transport, "DRAIN", 60)
+            monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 60)
 
 
 async def test_closing_in_a_cancelled_scope_closes_the_port(terminal: Terminal) -> None:
@@ -534,9 +553,130 @@ async def test_closing_in_a_cancelled_scope_closes_the_port(terminal: Terminal) 
 async def test_nothing_of_it_is_left_in_the_loop(terminal: Terminal) -> None:
     threads = set(threading.enumerate())
     async with linked(terminal) as link:
-        assert set(threading.enumerate()) == threads
+        ours = {thread for thread in threading.enumerate() if not thread.name.startswith("asyncio_")}
+        assert ours <= threads  # the loop ends its own
         call = asyncio.create_task(link.request(c.GET_POSE, None))
         await terminal.read(6)
 
     with pytest.raises(ConnectionLost, match="was closed"):
         await call
+
+
+# serialx
+
+
+@SERIALX
+async def test_serialx_has_dtr_and_rts_low_as_soon_as_the_port_is_open(
+    terminal: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pseudo-terminal has no such pins: what the system is asked for is looked at."""
+    asked: list[tuple[int, int]] = []
+    real = fcntl.ioctl
+
+    def noted(descriptor: int, request: int, argument: Any = 0, *more: Any) -> Any:
+        if request in {termios.TIOCMBIS, termios.TIOCMBIC, termios.TIOCMSET}:
+            asked.append((request, argument[0]))
+
+        return real(descriptor, request, argument, *more)
+
+    monkeypatch.setattr(fcntl, "ioctl", noted)
+    async with opened(terminal):
+        pins = termios.TIOCM_DTR | termios.TIOCM_RTS
+        assert asked == [(termios.TIOCMBIC, pins)]
+
+
+@SERIALX
+async def test_serialx_does_not_log_what_goes_over_the_line(
+    terminal: Terminal, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("DEBUG")
+    async with opened(terminal) as transport:
+        await transport.send(b"hunter2")
+        assert await terminal.read(7) == b"hunter2"
+        await terminal.write(b"hunter3")
+        assert await transport.receive()
+
+    assert "hunter" not in caplog.text
+
+
+@SERIALX
+async def test_serialx_may_be_cancelled_while_the_system_opens_the_port(
+    terminal: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serialx_transport, "PATIENCE", 0.05)
+    real, go, entered = os.open, threading.Event(), asyncio.Event()
+    loop = asyncio.get_running_loop()
+
+    def slowly(path: Any, *arguments: Any, **options: Any) -> int:
+        if path == terminal.path:
+            loop.call_soon_threadsafe(entered.set)
+            go.wait()
+
+        return real(path, *arguments, **options)
+
+    monkeypatch.setattr(os, "open", slowly)
+    opening = asyncio.create_task(open_transport(terminal.url, arm="magician"))
+    await entered.wait()
+    opening.cancel()
+    await asyncio.wait([opening])
+    assert opening.cancelled()
+
+    go.set()
+    while any(task.get_name() == "dobot_async open" for task in asyncio.all_tasks()):
+        await step(1)
+
+    monkeypatch.setattr(os, "open", real)
+    await released(terminal)
+
+
+@SERIALX
+async def test_a_port_of_one_backend_is_in_use_for_the_other(terminal: Terminal) -> None:
+    async with opened(terminal):
+        with pytest.raises(ConnectFailed, match="is no other program using it"):
+            await open_transport(f"serial://{terminal.path}?backend=pyserial", arm="magician")
+
+
+# Which backend
+
+
+async def test_pyserial_is_the_usual_one(terminal: Terminal) -> None:
+    transport = await open_transport(f"serial://{terminal.path}", arm="magician")
+    assert isinstance(transport, serial_transport.SerialTransport)
+    await transport.aclose()
+
+
+@pytest.mark.parametrize(("installed", "name"), [(True, "serialx"), (False, "serial")])
+def test_on_windows_serialx_is_the_usual_one_if_it_is_installed(
+    monkeypatch: pytest.MonkeyPatch, installed: bool, name: str
+) -> None:
+    monkeypatch.setattr(sys, "platform", "win32")
+    if not installed:
+        forget(monkeypatch, "serialx", "dobot_async.transports.serialx")
+
+    assert serial_port.usual().__module__ == f"dobot_async.transports.{name}"
+
+
+def forget(monkeypatch: pytest.MonkeyPatch, missing: str, user: str) -> None:
+    """A module cannot be imported any more, and who uses it has not been yet."""
+    monkeypatch.setitem(sys.modules, missing, None)
+    monkeypatch.delitem(sys.modules, user, raising=False)
+    monkeypatch.delattr(f"dobot_async.transports.{user.rpartition('.')[2]}", raising=False)
+
+
+async def test_a_backend_that_is_not_installed_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    forget(monkeypatch, "serialx", "dobot_async.transports.serialx")
+    with pytest.raises(ConnectFailed, match=r"serialx is not installed.*pip install 'dobot-async\[serialx\]'"):
+        await open_transport("serial:///dev/ttyUSB0?backend=serialx", arm="magician")
+
+
+async def test_another_library_in_pyserials_place_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """serialx-compat brings a serial_asyncio without what is needed of it."""
+    forget(monkeypatch, "serial_asyncio", "dobot_async.transports.serial")
+    monkeypatch.setitem(sys.modules, "serial_asyncio", types.ModuleType("serial_asyncio"))
+    with pytest.raises(ConnectFailed, match=r"pip uninstall serialx-compat.*backend=serialx"):
+        await open_transport("serial:///dev/ttyUSB0", arm="magician")
+
+
+async def test_a_backend_that_there_is_not_is_wrong() -> None:
+    with pytest.raises(ValueError, match="backend='usb': expected pyserial or serialx"):
+        await open_transport("serial:///dev/ttyUSB0?backend=usb", arm="magician")

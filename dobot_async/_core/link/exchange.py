@@ -306,6 +306,7 @@ class Exchange(Connection, Generic[F]):
 
         self._stragglers.lost(request.key, self._loop.time(), counts=not request.held)
         self._losses += 1
+        self._stats.lost += 1
 
     def _note(self, outgoing: bool, frame: F) -> None:
         """Tell those who look on of a frame."""

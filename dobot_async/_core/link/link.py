@@ -22,7 +22,7 @@ from dobot_async._core.link.connection import Reopen
 from dobot_async._core.link.correlator import Outcome
 from dobot_async._core.link.exchange import Exchange
 from dobot_async._core.link.round_trip import RoundTrip
-from dobot_async._core.protocol.contract import Encoder, Frame, LinkState, LinkStats, Parser, Unexpected
+from dobot_async._core.protocol.contract import Encoder, Frame, LineLimits, LinkState, LinkStats, Parser, Unexpected
 from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.protocol.wire import Command
 from dobot_async._core.util.events import Events
@@ -57,6 +57,7 @@ class Link(Exchange[F]):
         heard_at: When the last frame came, in the loop's seconds.
         events: What happened unasked: frames that answered nothing, as `Unexpected`, and what the family adds.
         on_frame: Hooks, called with (outgoing, frame) for each frame.
+        on_data: Hooks, called with the bytes that have arrived, behind `on_frame` for the frames in them.
         on_unsolicited: Hooks, called with each frame that answered nothing.
         on_lost: Hooks, called once with what every later call raises when the link is lost and not reopened.
         cleanup: What still has to be done to the arm, until the link ends.
@@ -78,6 +79,7 @@ class Link(Exchange[F]):
         super().__init__(transport, url, reopen, barriers=barriers, filler=filler, round_trip=round_trip or RoundTrip())
         self.events: Events[object] = Events()
         self.on_frame: Hooks[[bool, F]] = Hooks()
+        self.on_data: Hooks[[bytes]] = Hooks()
         self.on_unsolicited: Hooks[[F]] = Hooks()
         self.on_lost: Hooks[[ConnectionLost]] = Hooks()
         self.cleanup = Cleanup(self.url)
@@ -93,11 +95,22 @@ class Link(Exchange[F]):
         return self._correlator.reorder_window
 
     @property
+    def limits(self) -> LineLimits:
+        """What the transport can carry at a time; it may change when the link is reopened."""
+        transport = self._transport
+        return LineLimits(transport.in_flight, transport.window, transport.reorder_window)
+
+    @property
     def stats(self) -> LinkStats:
         """A snapshot of what went over the link so far."""
         self._stats.junk_bytes = self._parser.junk_bytes
         self._stats.bad_frames = self._parser.bad_frames
         return LinkStats(**{name: getattr(self._stats, name) for name in LinkStats.__slots__})
+
+    @property
+    def round_trip(self) -> float | None:
+        """Seconds that an answer takes on the average; None before the first one."""
+        return self._round_trip.smoothed
 
     def frame(self, command: Command[Q, Any], value: Q, *, queued: bool = False) -> F:
         """Return the frame of a request; raise ValueError or TypeError where the arm could not take it."""
@@ -246,6 +259,8 @@ class Link(Exchange[F]):
         """Take the next bytes of the line."""
         self._arrived_at = self._loop.time()
         self._receive(self._parser.feed(data))
+        if self.on_data:
+            self.on_data(data)
 
     def _receive(self, frames: list[F]) -> None:
         """Hand frames to those who wait for them."""

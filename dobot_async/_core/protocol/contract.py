@@ -9,7 +9,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from dobot_async._core.protocol.wire import Command
 
-__all__ = ["Encoder", "Frame", "LinkState", "LinkStats", "Parser", "Unexpected"]
+__all__ = ["Encoder", "Frame", "LineLimits", "LinkState", "LinkStats", "Parser", "Unexpected"]
 
 
 class Frame(Protocol):
@@ -74,6 +74,21 @@ class Unexpected(Generic[F]):
     frame: F
 
 
+@dataclass(frozen=True, slots=True)
+class LineLimits:
+    """What a transport can carry at a time; see `transports.base.Transport`.
+
+    Attributes:
+        in_flight: Requests that may be unanswered.
+        window: Queued commands that may be unacknowledged.
+        reorder_window: Seconds within which messages may overtake one another.
+    """
+
+    in_flight: int
+    window: int
+    reorder_window: float
+
+
 @dataclass(slots=True)
 class LinkStats:
     """What went over a link so far.
@@ -82,6 +97,7 @@ class LinkStats:
         sent: Requests, repeated ones included.
         received: Whole frames with a good checksum.
         repeated: Requests that were sent again.
+        lost: Requests that the arm did not answer in their turn: they, or the answers to them, were lost.
         timeouts: Calls that failed because no answer came.
         unexpected: Frames that nobody waited for.
         junk_bytes: Bytes that belong to no frame.
@@ -91,6 +107,7 @@ class LinkStats:
     sent: int = 0
     received: int = 0
     repeated: int = 0
+    lost: int = 0
     timeouts: int = 0
     unexpected: int = 0
     junk_bytes: int = 0

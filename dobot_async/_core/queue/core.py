@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Coroutine, Generator, Sequence
 from contextlib import AbstractAsyncContextManager, AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TypeVar
@@ -22,6 +22,7 @@ from dobot_async._core.queue.motion import Motion, Outbox
 from dobot_async._core.queue.poller import StatusPoller
 from dobot_async._core.queue.stopper import Stopper
 from dobot_async._core.queue.writer import Writer
+from dobot_async._core.util.hooks import Hooks
 from dobot_async.errors import (
     ArmAlarm,
     CommandRejected,
@@ -42,10 +43,12 @@ class QueueCore:
 
     Attributes:
         epoch: What a motion in several steps is bound to; a stop ends it, and the next one is here.
+        outcomes: How many motions ended, by how: "done", or the name of the error that they raise.
     """
 
     def __init__(self, executor: Executor) -> None:
         self.epoch = Epoch()
+        self.outcomes: Counter[str] = Counter()
         self._executor = executor
         executor.on_unknown.add(self.give_up)
         self._outbox = Outbox(self._accepted)
@@ -130,6 +133,20 @@ class QueueCore:
     def watching(self) -> AbstractContextManager[None]:
         """While this is entered, the arm is asked how far it is."""
         return self._poller.watching()
+
+    @property
+    def on_motion(self) -> Hooks[[Motion]]:
+        """Hooks, called with each Motion when it was put, when the arm has accepted it, and when it has ended."""
+        return self._executor.on_motion
+
+    def note(self, motion: Motion) -> None:
+        """Tell those who look on what has become of a Motion."""
+        if self.on_motion:
+            self.on_motion(motion)
+
+    def count(self, error: DobotError | None) -> None:
+        """Take note of how something ended that moves the arm."""
+        self.outcomes["done" if error is None else type(error).__name__] += 1
 
     def roaming(self) -> AbstractAsyncContextManager[None]:
         """While this is entered, the arm may go anywhere; in a fleet it waits until it may."""
@@ -276,5 +293,6 @@ class QueueCore:
 
     def _accepted(self, motion: Motion) -> None:
         """The arm has taken a command."""
+        self.note(motion)
         self._pending.append(motion)
         self._poller.watch()

@@ -13,6 +13,7 @@ from dobot_async.errors import ArmAlarm, DobotError, MotionUnknown, ReplyTimeout
 
 if TYPE_CHECKING:
     from dobot_async._core.queue.keeper import Keeper
+    from dobot_async._core.queue.motion import Motion
 
 __all__ = ["Entry", "Executor", "Source", "alarmed", "in_motions", "unseen"]
 
@@ -52,10 +53,12 @@ class Executor(Protocol):
     Attributes:
         cleanup: What still has to be done to the arm.
         on_unknown: Hooks, called when a motion turns out to be unknown while nobody asks.
+        on_motion: Hooks of those who look on; here, for a fleet gives the arm another queue.
     """
 
     cleanup: Cleanup
     on_unknown: Hooks[[MotionUnknown]]
+    on_motion: Hooks[[Motion]]
 
     @property
     def keeper(self) -> Keeper[Any] | None:

@@ -19,6 +19,7 @@ from typing import Any, Protocol, TypeVar
 from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.executor import Entry, Source, unseen
 from dobot_async._core.queue.keeper import Keeper
+from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.hooks import Hooks
 from dobot_async._core.util.tasks import Cleanup, cancel_and_join
@@ -76,6 +77,7 @@ class HostExecutor:
     def __init__(self, runner: MotionRunner, cleanup: Cleanup, capacity: int = CAPACITY) -> None:
         self.cleanup = cleanup
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
+        self.on_motion: Hooks[[Motion]] = Hooks()
         self.on_progress: Hooks[[]] = Hooks()
         self._runner = runner
         self._capacity = capacity

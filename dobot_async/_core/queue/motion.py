@@ -25,6 +25,12 @@ class Watcher(Protocol):
         """While this is entered, the arm is asked how far it is."""
         ...
 
+    def note(self, motion: Motion) -> None:
+        """Tell those who look on what has become of a Motion."""
+
+    def count(self, error: DobotError | None) -> None:
+        """Take note of how something ended that moves the arm."""
+
 
 class Motion:
     """One queued command; awaitable any number of times, by any number of tasks.
@@ -120,6 +126,9 @@ class Motion:
             self._error = error
             self._ended.set()
             self.accepted_or_ended.set()
+            self._queue.note(self)
+            if self.moves:
+                self._queue.count(error)
 
 
 LOOKED_AT = 1.0

@@ -48,6 +48,7 @@ class MotionQueue(QueueCore):
 
     Attributes:
         epoch: What a motion in several steps is bound to; a stop ends it, and the next one is here.
+        outcomes: How many motions ended, by how: "done", or the name of the error that they raise.
     """
 
     async def put(
@@ -91,6 +92,7 @@ class MotionQueue(QueueCore):
         timeout, call, epoch = check_timeout(timeout), object(), epoch or self.epoch
         for motion in motions:
             motion.call = call
+            self.note(motion)
 
         await self._keep(motions)
         self._check_free(motions, epoch)

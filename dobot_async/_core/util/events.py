@@ -35,9 +35,13 @@ class Events(Generic[T]):
         for listener in self._listeners:
             listener.close()
 
+    def add(self, listener: Listener[T]) -> None:
+        """Lets somebody listen from now on, for as long as he is held by somebody else."""
+        self._listeners.add(listener)
+
     def __aiter__(self) -> Listener[T]:
         listener: Listener[T] = Listener(closed=self._closed)
-        self._listeners.add(listener)
+        self.add(listener)
         return listener
 
 
@@ -98,6 +102,10 @@ class Watched(Generic[T]):
         if value != self.value:
             self.value = value
             self._changes.publish(value)
+
+    def add(self, listener: Listener[T]) -> None:
+        """Lets somebody listen from now on, for as long as he is held by somebody else."""
+        self._changes.add(listener)
 
     def close(self) -> None:
         """Ends every reader's loop once it has read the last change."""

@@ -34,10 +34,12 @@ from dobot_async.arms.magician.ranges import check_ranges
 from dobot_async.arms.magician.reach import check_reach as check_target
 from dobot_async.arms.magician.readings import Readings
 from dobot_async.arms.magician.sensors import Sensors
+from dobot_async.arms.magician.traced import FRAMES
 from dobot_async.arms.magician.verbs import Verbs
 from dobot_async.arms.magician.wifi import WiFi
 from dobot_async.arms.session import arm_session, check_options, open_in_time, run_owned
 from dobot_async.errors import DobotError, MotionStopped
+from dobot_async.traces.recorder import Record, Recording
 
 __all__ = ["Jog", "Magician"]
 
@@ -93,6 +95,7 @@ class Magician(Readings, Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
         reconnect: bool = False,
         reply_timeout: float | tuple[float, float] = (0.02, 0.5),
         workspace: Workspace | Box | Cylinder | None = None,
+        record: Record | None = None,
     ) -> AsyncGenerator[Self]:
         """Connects to an arm for the length of a block.
 
@@ -115,6 +118,8 @@ class Magician(Readings, Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
             workspace: Where the tool may be, in mm and the arm's own coordinates: a `Workspace`, or a Box or Cylinder
                 that is allowed. Targets, and ways as far as they are known, raise OutsideWorkspace, a ValueError,
                 before anything is sent; docs/workspace.md says what is looked at.
+            record: Where to write down what goes over the connection, for the length of the block: a path, or a
+                `dobot_async.traces.TraceFile`. Passwords are left out; see docs/trace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -148,7 +153,9 @@ class Magician(Readings, Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
                 workspace=kept,
             )
 
-        async with arm_session(url, timeout, reopen, build, stop_on_error=control and on_error == "stop") as arm:
+        recording = Recording(record, FRAMES, "magician", (floor, ceiling))
+        stop = control and on_error == "stop"
+        async with arm_session(url, timeout, reopen, build, stop_on_error=stop, recording=recording) as arm:
             assert isinstance(arm, cls)
             yield arm
 

@@ -18,6 +18,7 @@ from dobot_async._core.link.correlator import Request
 from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.wire import Command, Number, u64
 from dobot_async._core.queue.executor import Entry, Source, alarmed
+from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.hooks import Hooks
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import Alarm, faults
@@ -54,6 +55,7 @@ class Submission:
     def __init__(self, link: Link[Frame], window: int, check: Callable[[Any], None]) -> None:
         self.cleanup = link.cleanup
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
+        self.on_motion: Hooks[[Motion]] = Hooks()
         self.status = ArmStatus(link, self._restarted)
         self.ledger = QueueLedger()
         self.space = QueueSpace(self.status)

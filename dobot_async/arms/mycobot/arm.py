@@ -28,9 +28,11 @@ from dobot_async.arms.mycobot.models import DEFAULT, CobotModel, Range, model_of
 from dobot_async.arms.mycobot.opening import BARRIERS, GAP, greet, opened, reply_times, with_baud
 from dobot_async.arms.mycobot.queue import CobotQueue
 from dobot_async.arms.mycobot.readings import Readings
+from dobot_async.arms.mycobot.traced import frames_of
 from dobot_async.arms.mycobot.verbs import Verbs
 from dobot_async.arms.session import arm_session, check_options, run_owned
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
+from dobot_async.traces.recorder import Record, Recording
 
 __all__ = ["BARRIERS", "GAP", "MyCobot", "opened", "with_baud"]
 
@@ -100,6 +102,7 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         limits: Mapping[str, Range] | None = None,
         gap: float = GAP,
         workspace: Workspace | Box | Cylinder | None = None,
+        record: Record | None = None,
     ) -> AsyncGenerator[Self]:
         """Connect to an arm for the length of a block.
 
@@ -128,6 +131,8 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 Cylinder that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is
                 sent, or CommandRejected where it shows when its turn comes. Motions given in joints are not looked at;
                 see docs/workspace.md.
+            record: Where to write down what goes over the connection, for the length of the block: a path, or a
+                `dobot_async.traces.TraceFile`. Passwords are left out; see docs/trace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -173,6 +178,7 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
             reopen,
             lambda transport, found: build(connected(transport, found)),
             stop_on_error=control and on_error == "stop",
+            recording=Recording(record, frames_of(arm_model), model, (floor, ceiling)),
         ) as arm:
             yield arm
             unsent = arm.queue.unsent

@@ -14,6 +14,7 @@ from dobot_async.arms.mycobot.models import CobotModel
 from dobot_async.arms.mycobot.stopping import stop_until_still
 from dobot_async.arms.session import open_in_time
 from dobot_async.errors import ConnectFailed, ConnectionLost, ProtocolError
+from dobot_async.traces.replay import recorded_times
 from dobot_async.transports.paced import Paced
 
 __all__ = ["BARRIERS", "GAP", "greet", "opened", "reply_times", "with_baud"]
@@ -38,7 +39,7 @@ BARRIERS = (
 
 def reply_times(url: str) -> tuple[float, float]:
     """Return the least and the most seconds until a request to a URL is sent again, by default."""
-    return PATIENT if urlsplit(url).scheme == "tcp" else USUAL
+    return recorded_times(url) or (PATIENT if urlsplit(url).scheme == "tcp" else USUAL)
 
 
 async def opened(url: str, model: str, timeout: float, gap: float) -> Transport:

@@ -31,8 +31,10 @@ from dobot_async.arms.ultraarm.readings import Readings
 from dobot_async.arms.ultraarm.runner import UltraArmRunner
 from dobot_async.arms.ultraarm.state import JOGS
 from dobot_async.arms.ultraarm.tools import darken
+from dobot_async.arms.ultraarm.traced import FRAMES
 from dobot_async.arms.ultraarm.verbs import Pump, Verbs
 from dobot_async.errors import DobotError, MotionStopped
+from dobot_async.traces.recorder import Record, Recording
 
 __all__ = ["UltraArm", "UltraArmJog"]
 
@@ -96,6 +98,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         home_switches: tuple[int, int, int] | None = (1, 1, 1),
         on_stop: Literal["release", "finish"] = "release",
         workspace: Workspace | Box | Cylinder | None = None,
+        record: Record | None = None,
     ) -> AsyncGenerator[Self]:
         """Connect to an arm for the length of a block.
 
@@ -125,6 +128,8 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is sent, or
                 CommandRejected where it shows when its turn comes. Motions given in joints are not looked at; see
                 docs/workspace.md.
+            record: Where to write down what goes over the connection, for the length of the block: a path, or a
+                `dobot_async.traces.TraceFile`. Passwords are left out; see docs/trace.md.
 
         Raises:
             ValueError: The URL or an argument is wrong.
@@ -165,7 +170,9 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 workspace=kept,
             )
 
-        async with arm_session(url, timeout, reopen, build, stop_on_error=control and on_error == "stop") as arm:
+        recording = Recording(record, FRAMES, "ultraarm", (floor, ceiling))
+        stop = control and on_error == "stop"
+        async with arm_session(url, timeout, reopen, build, stop_on_error=stop, recording=recording) as arm:
             assert isinstance(arm, cls)
             yield arm
 

@@ -11,7 +11,7 @@ from dobot_async.arms.magician.alarms import Alarm
 from dobot_async.arms.magician.arm import Jog, Magician
 from dobot_async.arms.magician.params import Pose
 from dobot_async.arms.magician.vocabulary import MODES
-from dobot_async.cli.arms.magician_frames import described, pieces
+from dobot_async.cli.arms.magician_frames import pieces
 from dobot_async.cli.family import Family, Told
 
 __all__ = ["MAGICIAN", "joint_words", "tool_words"]
@@ -100,7 +100,6 @@ MAGICIAN = Family(
     jog=Magician.jog,
     directions={each.name.lower().replace("_plus", "+").replace("_minus", "-"): each for each in Jog},
     suction=lambda arm, on: arm.suction(on, pump=on),
-    describe=described,
     pieces=pieces,
     alarms=True,
 )

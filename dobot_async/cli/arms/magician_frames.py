@@ -2,28 +2,20 @@
 
     AA AA 02 0A 00 F6 | AA AA 02 0A 00 F5 | AA AA 13 54      GetPose; a wrong checksum; the beginning of a frame
 
-A Wi-Fi password is left out of a trace, and so are the length and the checksum, which tell something of it. All names,
-layouts and sections are those of the command table.
+All names, layouts and sections are those of the command table.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
-from dobot_async._core.protocol.wire import Command, Number, u64
-from dobot_async.arms.magician import alarms
-from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import Frame, Parser
-from dobot_async.cli.output import plain
-from dobot_async.cli.trace import MASK, REPLY, REQUEST
-from dobot_async.errors import ProtocolError
+from dobot_async.arms.magician.traced import raw, readings
+from dobot_async.traces.words import REPLY, REQUEST
 
-__all__ = ["described", "pieces"]
+__all__ = ["pieces"]
 
-INDEX = Number[int](u64)
-SECRET = {c.SET_WIFI_PASSWORD.id}
 HEADER = b"\xaa\xaa"
 OVERHEAD = 4  # header, Len, checksum
 LENGTHS = set(range(2, 251)) - {HEADER[0]}
@@ -91,60 +83,3 @@ def piece_of(frame: Frame) -> dict[str, Any]:
         "rw_fits": command is None or command.write == frame.write,
         **values,
     }
-
-
-def readings(frame: Frame, roles: Iterable[str]) -> tuple[Command[Any, Any] | None, dict[str, Any]]:
-    """Returns what a frame can be: the command, and its values in each role ("request", "reply") that they fit.
-
-    The rows of the frame's ID are tried in turn, the one of its own rw bit first, for frames with another one exist.
-    Where nothing fits the command is that of the first row, None for an ID that is not in the table.
-    """
-    rows = [c.BY_KEY[key] for key in ((frame.id, frame.write), (frame.id, not frame.write)) if key in c.BY_KEY]
-    for row in rows:
-        fitting = dict(fits(row, frame, roles))
-        if fitting:
-            return row, fitting
-
-    return (rows[0] if rows else None), {}
-
-
-def raw(frame: Frame) -> bytes:
-    """Returns the bytes of a frame, also of one that is longer than may be sent."""
-    payload = bytes((frame.id, frame.ctrl)) + frame.params
-    return b"\xaa\xaa" + bytes((len(payload),)) + payload + bytes((-sum(payload) & 0xFF,))
-
-
-def described(frame: Frame, *, outgoing: bool) -> dict[str, Any]:
-    """What a trace says of a frame."""
-    role = REQUEST if outgoing else REPLY
-    command, values = readings(frame, [role])
-    if frame.id in SECRET and frame.params:
-        return {**head(outgoing, command), "value": MASK, "raw": f"aa aa {MASK} {frame.id:02x} {frame.ctrl:02x} {MASK}"}
-
-    line = {**head(outgoing, command), "value": values.get(role), "raw": raw(frame).hex(" ")}
-    if role not in values:
-        line["problem"] = f"the parameters do not fit a {role}" if command else f"no command has the ID {frame.id}"
-
-    return line
-
-
-def head(outgoing: bool, command: Command[Any, Any] | None) -> dict[str, Any]:
-    """When a frame went which way, and what it is called."""
-    direction = "out" if outgoing else "in"
-    return {"time": time.time(), "direction": direction, "command": command and command.name}
-
-
-def fits(row: Command[Any, Any], frame: Frame, roles: Iterable[str]) -> Iterator[tuple[str, Any]]:
-    """Yields the roles in which the parameters fit a row, with their values."""
-    for role in roles:
-        try:
-            if role == REQUEST:
-                yield role, plain(row.request.decode(frame.params))
-            elif frame.queued:
-                yield role, {"index": INDEX.decode(frame.params)}
-            elif row is c.GET_ALARMS_STATE:
-                yield role, [f"0x{alarm.code:02X} {alarm.name}" for alarm in alarms.decode(frame.params)]
-            else:
-                yield role, plain(row.reply.decode(frame.params))
-        except ProtocolError:
-            continue

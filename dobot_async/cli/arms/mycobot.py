@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractAsyncContextManager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 import click
 
+from dobot_async._core.util.plain import plain
 from dobot_async.arms.mycobot import commands as c
 from dobot_async.arms.mycobot.alarms import CobotAlarm
 from dobot_async.arms.mycobot.arm import MyCobot
@@ -17,9 +18,8 @@ from dobot_async.arms.mycobot.frame import Frame, Parser
 from dobot_async.arms.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
 from dobot_async.arms.mycobot.pose import CobotPose
 from dobot_async.cli.family import Family, Pieces, Told
-from dobot_async.cli.output import plain
-from dobot_async.cli.trace import REPLY, REQUEST
 from dobot_async.errors import ProtocolError
+from dobot_async.traces.words import REPLY, REQUEST
 
 __all__ = ["COBOTS"]
 
@@ -104,28 +104,6 @@ async def suction(_arm: MyCobot, _on: bool) -> None:
     raise click.UsageError("this arm has no pump of its own")
 
 
-def describe(model: CobotModel) -> Callable[..., Mapping[str, Any]]:
-    """What a trace says of this model's frames."""
-
-    def described(frame: Frame, *, outgoing: bool) -> dict[str, Any]:
-        row = model.row(model.by_id[frame.id])
-        line = {
-            "time": time.time(),
-            "direction": "out" if outgoing else "in",
-            "command": row.name,
-            "value": None,
-            "raw": bytes(frame).hex(" "),
-        }
-        try:
-            line["value"] = plain((row.request if outgoing else row.reply).decode(frame.params))
-        except ProtocolError as error:
-            line["problem"] = str(error)
-
-        return line
-
-    return described
-
-
 def cobot_pieces(model: CobotModel) -> Pieces:
     """What finds the pieces of a myCobot's bytes; which frames there are depends on the model."""
 
@@ -188,7 +166,6 @@ def family(name: str) -> Family:
         jog=jog,
         directions={f"{word}{way}": f"{word}{way}" for word in words for way in "+-"},
         suction=suction,
-        describe=describe(model),
         pieces=cobot_pieces(model),
         numbers=max(model.joints, len(model.reach)),
         alarms=True,

@@ -12,14 +12,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from dobot_async._core.util.plain import plain
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.arm import UltraArm, UltraArmJog
-from dobot_async.arms.ultraarm.frame import Frame, errors, split_words
+from dobot_async.arms.ultraarm.frame import errors, split_words
 from dobot_async.arms.ultraarm.params import UltraArmAngles, UltraArmCoords
 from dobot_async.cli.family import Family, Told
-from dobot_async.cli.output import plain
-from dobot_async.cli.trace import REPLY, REQUEST
 from dobot_async.errors import ProtocolError
+from dobot_async.traces.words import REPLY, REQUEST
 
 __all__ = ["ULTRAARM"]
 
@@ -93,17 +93,6 @@ async def ultraarm_move(arm: UltraArm, numbers: Sequence[float], mode: str) -> N
         await arm.move_to(*numbers)
 
 
-def traced_line(frame: Frame, *, outgoing: bool) -> dict[str, Any]:
-    """What a trace says of a line, or of the lines of an answer."""
-    return {
-        "time": time.time(),
-        "direction": "out" if outgoing else "in",
-        "command": frame.word.decode("ascii") or None,
-        "value": frame.params.decode("ascii", "replace").strip(),
-        "raw": bytes(frame).hex(" "),
-    }
-
-
 def ultraarm_pieces(data: bytes) -> Iterator[dict[str, Any]]:
     """The pieces of an ultraArm's bytes: its lines."""
     for found in LINE.finditer(data):
@@ -145,7 +134,6 @@ ULTRAARM = Family(
     jog=UltraArm.jog,
     directions={each.name.lower().replace("_plus", "+").replace("_minus", "-"): each for each in UltraArmJog},
     suction=UltraArm.suction,
-    describe=traced_line,
     pieces=ultraarm_pieces,
     text=True,
 )

@@ -17,19 +17,20 @@ from typing import Any, TypeVar
 import click
 
 from dobot_async.cli.cell_program import CellProgram, parse_cell_program, run_cell_program
-from dobot_async.cli.cell_watch import Reading, kind_of, observe, read, told_by, trace_of
+from dobot_async.cli.cell_watch import Reading, joined_alone, observe, read, told_by
 from dobot_async.cli.failures import FAILED, WrongFile
 from dobot_async.cli.output import Output
 from dobot_async.cli.params import ABOVE_ZERO, PROGRAM, Text
 from dobot_async.cli.program_files import wrong
 from dobot_async.cli.session import Session, run
-from dobot_async.cli.trace import TraceFile, tracing
+from dobot_async.cli.trace import tracing
 from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell, parse_cell
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.fleet.seat import Member
 from dobot_async.program import ProgramError
 from dobot_async.program.text import lines_in
+from dobot_async.traces import TraceFile
 
 __all__ = ["cell"]
 
@@ -51,14 +52,10 @@ class Chosen:
 
     @asynccontextmanager
     async def fleet(self, trace: TraceFile | None) -> AsyncGenerator[Fleet[Any]]:
-        """Connects to all arms; the trace begins when they are connected."""
-        cell = self.cell
-        async with Fleet.connect(cell.members, zones=cell.zones, groups=cell.groups) as fleet:
+        """Connects to all arms."""
+        cell, record = self.cell, {"record": trace} if trace else {}
+        async with Fleet.connect(cell.members, zones=cell.zones, groups=cell.groups, **record) as fleet:
             self.session.commanding = True
-            for name, member in cell.members.items():
-                if trace:
-                    fleet[name].link.on_frame.add(trace_of(trace, name, member))
-
             yield fleet
 
 
@@ -195,8 +192,7 @@ async def alone(
     with tracing(here.session.trace) as trace:
 
         async def asked(name: str, member: Member[Any]) -> T:
-            options = {**member.options, "control": control, "queue": "keep"}
-            async with kind_of(name, member, trace).connect(member.url, **options) as arm:
+            async with joined_alone(name, member, trace, control=control) as arm:
                 return await question(name, arm)
 
         work = [asked(name, member) for name, member in members.items()]

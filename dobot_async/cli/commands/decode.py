@@ -14,8 +14,8 @@ from dobot_async.cli.family import Family
 from dobot_async.cli.output import words
 from dobot_async.cli.params import standard_input
 from dobot_async.cli.session import Session
-from dobot_async.cli.trace import MASK, REPLY, REQUEST
 from dobot_async.program.text import LARGEST, lines_in, shortened
+from dobot_async.traces.words import MASK, REPLY, REQUEST
 
 __all__ = ["decode"]
 
@@ -76,6 +76,9 @@ def traced_pieces(family: Family, number: int, line: str) -> Iterator[dict[str, 
     """Yields the pieces of one line of a trace."""
     try:
         told = json.loads(line)
+        if told["kind"] not in {"frame", "junk"} or "raw" not in told:
+            return
+
         raw = told["raw"]
         data = b"" if MASK in raw else bytes.fromhex(raw)
     except (ValueError, LookupError, TypeError, RecursionError):
