@@ -93,10 +93,7 @@ class Fleet(Programs[A]):
             ValueError: A URL or an argument is wrong.
             ConnectFailed: An arm did not answer; the message names it.
         """
-        members = {
-            name: arm if isinstance(arm, Member) else Member(arm, cast("type[Any]", Magician))
-            for name, arm in arms.items()
-        }
+        members = {name: as_member(arm) for name, arm in arms.items()}
         groups = groups or {}
         if not members:
             raise ValueError("a fleet has at least one arm")
@@ -107,7 +104,7 @@ class Fleet(Programs[A]):
                 f'each group is in groups, with "fleet", "group" or "alone"; not so: {sorted(unknown) or dict(groups)}'
             )
 
-        fleet = cls(cast(Any, members), zones or {}, groups)
+        fleet = cls(members, zones or {}, groups)
         return fleet._connected(options)
 
     @classmethod
@@ -263,6 +260,11 @@ class Fleet(Programs[A]):
             except BaseException:
                 abandon(batches)
                 raise
+
+
+def as_member(arm: str | Member[Any]) -> Member[Any]:
+    """What a fleet is told of an arm; a URL is that of a Magician."""
+    return arm if isinstance(arm, Member) else Member(arm, Magician)
 
 
 async def stopped(stop: asyncio.Task[None], timeout: float) -> None:

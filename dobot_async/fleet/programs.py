@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from contextlib import AbstractAsyncContextManager
+from functools import partial
 from typing import Any, Concatenate, ParamSpec, TypeVar, overload
 
 from dobot_async.errors import DobotError
@@ -47,12 +48,14 @@ class Programs(FleetBase[A]):
         parent, epoch = here(), self._epoch
 
         async def done(seat: FleetArm) -> Any:
-            method = getattr(seat.arm, verb) if isinstance(verb, str) else None
+            does: Callable[..., Awaitable[Any]] = (
+                getattr(seat.arm, verb) if isinstance(verb, str) else partial(verb, seat.arm)
+            )
             part = FleetProgram(ZoneHolder(f"each {seat.name}"), asyncio.current_task(), parent, epoch=epoch)
             try:
                 with running(part):
                     part.check()
-                    return await (method(*args, **kwargs) if method else verb(seat.arm, *args, **kwargs))
+                    return await does(*args, **kwargs)
             except (DobotError, ValueError) as error:
                 named(seat.name, error)
                 raise

@@ -1,6 +1,6 @@
 """Runs many seeds, on all cores: `make soak SEEDS=100000`, or one with its trace: `soak.py --seed N --verbose`.
 
-`--of cell` takes the scenario of a cell instead of that of one arm, `--of guards`, `--of lost` and `--of stops` those
+`--of cell` takes the scenario of a cell instead of that of one arm; `--of guards`, `--of lost` and `--of stops` those
 of guarded arms whose tools are watched, of arms that lose their places, and of cells that are stopped. A seed that
 fails is printed with the command that replays it. `--memory` works in one process for hours of simulated time, and
 prints how much memory it takes.
