@@ -1,9 +1,9 @@
 """What pages say to those who read the files themselves, made fit for the site.
 
 Links to files outside of docs/ lead to the page that shows the file: an example is on the page of examples. What has no
-page of its own is a download, as MyST does it; a folder, or a page elsewhere, is in the repository. A link
-that leads nowhere stays as it is, and fails the build. A page that shows a file of the root has its text. And the list of decisions, a README as others are, is told to be the
-parent of each of them.
+page of its own is a download, as MyST does it; a folder, or a page elsewhere, is in the repository. A link that leads
+nowhere stays as it is, and fails the build. A page that shows a file of the root has its text. And the list of
+decisions, a README as others are, is told to be the parent of each of them.
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ def rewrite(document: str, text: str) -> str:
         elif example := EXAMPLES.fullmatch(target):
             page, anchor = PAGES["examples"], f"#{example[1]}py"
 
-        elif page is None and ((ROOT / target).is_dir() or (ROOT / target).suffix == ".md" and (ROOT / target).exists()):
+        elif page is None and (
+            (ROOT / target).is_dir() or ((ROOT / target).suffix == ".md" and (ROOT / target).exists())
+        ):
             return f"]({REPOSITORY}/tree/main/{target}{anchor or ''})"
 
         return match[0] if page is None else f"]({relative(page, depth)}{anchor or ''})"
