@@ -5,7 +5,7 @@
 What MCP and MQTT have in common: which arms there are, what may be done with them, and within which limits.
 """
 
-from dobot_async.remote.actions import ACTIONS, Action, parse_action
+from dobot_async.remote.actions import Action, parse_action
 from dobot_async.remote.drawing import Draw
 from dobot_async.remote.moves import Grip, Home, Move, Pick, Place, Recover
 from dobot_async.remote.site import RemoteArm, Site, open_site
@@ -13,7 +13,6 @@ from dobot_async.remote.told import reach_told, scene_told, state_told
 from dobot_async.remote.works import Busy, Works
 
 __all__ = [
-    "ACTIONS",
     "Action",
     "Busy",
     "Draw",

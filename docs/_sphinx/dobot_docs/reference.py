@@ -99,7 +99,7 @@ def entry(name: str, value: object) -> Iterator[str]:
     if isinstance(value, type):
         yield "   :members:"
         yield "   :undoc-members:"
-        yield "   :inherited-members: BaseException, int, tuple, Enum"
+        yield "   :inherited-members: BaseException, int, tuple, Enum, MCPServer"
         yield f"   :exclude-members: {', '.join(INSIDE)}"
 
     yield ""
