@@ -1,9 +1,9 @@
 """What pages say to those who read the files themselves, made fit for the site.
 
 Links to files outside of docs/ lead to the page that shows the file: an example is on the page of examples. What has no
-page of its own is a download, as MyST does it; a folder, or a page elsewhere, is in the repository. A link
-that leads nowhere stays as it is, and fails the build. A page that shows a file of the root has its text. And the list of decisions, a README as others are, is told to be the
-parent of each of them.
+page of its own is a download, as MyST does it; a folder, or a page elsewhere, is in the repository. A link that leads
+nowhere stays as it is, and fails the build. A page that shows a file of the root has its text. And the list of
+decisions, a README as others are, is told to be the parent of each of them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sphinx.application import Sphinx
 
 from dobot_docs.names import ROOT
 
-__all__ = ["SHOWN", "register", "rewrite", "text_of"]
+__all__ = ["REPOSITORY", "SHOWN", "register", "rewrite", "text_of"]
 
 REPOSITORY = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["urls"]["Repository"]
 RELATIVE = re.compile(r"\]\((?![a-z]+:|#)([^)\s]+)\)")
@@ -62,12 +62,20 @@ def rewrite(document: str, text: str) -> str:
         elif example := EXAMPLES.fullmatch(target):
             page, anchor = PAGES["examples"], f"#{example[1]}py"
 
-        elif page is None and ((ROOT / target).is_dir() or (ROOT / target).suffix == ".md" and (ROOT / target).exists()):
+        elif page is None and (
+            (ROOT / target).is_dir() or (ROOT / target).suffix == ".md" and (ROOT / target).exists()
+        ):
             return f"]({REPOSITORY}/tree/main/{target}{anchor or ''})"
 
         return match[0] if page is None else f"]({relative(page, depth)}{anchor or ''})"
 
     return LINK.sub(changed, text)
+
+
+def is_of_the_repository(target: str) -> bool:
+    """Whether a target is a folder, or a page outside of docs/."""
+    path = ROOT / target
+    return path.is_dir() or (path.suffix == ".md" and path.is_file())
 
 
 def relative(page: str, depth: int) -> str:
