@@ -28,7 +28,7 @@ from typing import Any
 
 from report import BAUD, BITS
 
-from dobot_async.endpoints.line_rate import AtBaud, Wired
+from dobot_async.endpoints.line_rate import RateLimited, Wired
 from dobot_async.endpoints.pty import on_pty
 from dobot_async.mycobot import commands as cobot
 from dobot_async.simulator import MyCobotQuirks, Simulation, simulate
@@ -117,7 +117,7 @@ class Ear:
     def __init__(self, host: Simulation, baud: int, hears: bytes, came: Callable[[], float]) -> None:
         self._came = came
         self.heard: list[float] = []
-        self._lines = AtBaud(host, baud)
+        self._lines = RateLimited(host, baud)
         self._takes = len(hears) * BITS / baud
         self._hears = hears
 

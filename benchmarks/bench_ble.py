@@ -34,12 +34,12 @@ from dobot_async._core.protocol.transport import Transport
 from dobot_async.arms.magician.frame import Frame, Parser, encode
 from dobot_async.magician import commands as c
 from dobot_async.simulator import simulate
-from dobot_async.simulator.ble.link_layer import Radio, round_trip
+from dobot_async.simulator.ble.link_layer import RadioSettings, round_trip
 from dobot_async.simulator.ble.testbed import forget_bus
 from dobot_async.transports import open_transport
 from dobot_async.transports.ble.transport import PACE
 
-RADIOS = [Radio(interval=interval, mtu=mtu) for interval in (0.0075, 0.015, 0.03, 0.05) for mtu in (23, 247)]
+RADIOS = [RadioSettings(interval=interval, mtu=mtu) for interval in (0.0075, 0.015, 0.03, 0.05) for mtu in (23, 247)]
 PARAMS = c.SET_PTP_JOINT_PARAMS.request.encode(c.PTPJointParams((200.0,) * 4, (200.0,) * 4))
 REQUESTS = {
     "GetPose": encode(Frame(c.GET_POSE.id, 0, b"")),
@@ -57,7 +57,7 @@ async def ask(transport: Transport, request: bytes) -> int:
     return len(encode(found[0]))
 
 
-async def measure(radio: Radio, url: str, pace: float, requests: int) -> list[Row]:
+async def measure(radio: RadioSettings, url: str, pace: float, requests: int) -> list[Row]:
     """The rows of one connection."""
     rows = []
     transport = await open_transport(f"{url}?pace={pace}", arm="magician")

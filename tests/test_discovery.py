@@ -24,8 +24,8 @@ from hypothesis import strategies as st
 from virtual import virtual
 
 from dobot_async import ConnectFailed, DeviceInfo, DiscoveryProblem, Found, Magician, discover
-from dobot_async.discovery import SOURCES, Source, wifi
-from dobot_async.discovery.families import FAMILIES, Family
+from dobot_async.discovery import SOURCES, DiscoverySource, wifi
+from dobot_async.discovery.families import FAMILIES, DiscoverableFamily
 from dobot_async.discovery.found import natural, printable
 from dobot_async.discovery.serial_ports import SerialPorts
 from dobot_async.discovery.wifi import QUESTION, WiFiModules, understood
@@ -226,7 +226,7 @@ async def test_arms_without_a_serial_number_are_not_taken_for_one() -> None:
     async def nameless(url: str, timeout: float) -> DeviceInfo:
         return DeviceInfo("", "", "1.0.0")
 
-    families = [Family("magician", frozenset(), nameless)]
+    families = [DiscoverableFamily("magician", frozenset(), nameless)]
     sources = [Listed("one", [way("serial://COM1")]), Listed("two", [way("udp://10.0.0.1")])]
     assert len(await everything(sources=sources, probe=True, families=families)) == 2
 
@@ -241,7 +241,7 @@ async def test_who_does_not_answer_is_told_all_the_same() -> None:
 async def test_families_are_asked_in_turn_until_one_answers() -> None:
     asked: list[tuple[str, float]] = []
 
-    def family(name: str, answer: DeviceInfo | Exception) -> Family:
+    def family(name: str, answer: DeviceInfo | Exception) -> DiscoverableFamily:
         async def probe(url: str, timeout: float) -> DeviceInfo:
             asked.append((name, timeout))
             if isinstance(answer, Exception):
@@ -249,11 +249,11 @@ async def test_families_are_asked_in_turn_until_one_answers() -> None:
 
             return answer
 
-        return Family(name, frozenset(), probe)
+        return DiscoverableFamily(name, frozenset(), probe)
 
     info = DeviceInfo("1", "myArm", "1.0")
     families = [
-        Family("mute", frozenset()),
+        DiscoverableFamily("mute", frozenset()),
         family("magician", ConnectFailed("no Magician")),
         family("mycobot", info),
         family("ultraarm", info),
@@ -280,7 +280,14 @@ async def test_a_source_says_how_many_are_probed_at_a_time() -> None:
 
     found = [way(f"ble://{number}") for number in range(5)]
     source = Listed("ble", found, probes_at_once=1)
-    assert len(await everything(sources=[source], probe=True, families=[Family("magician", frozenset(), probe)])) == 5
+    assert (
+        len(
+            await everything(
+                sources=[source], probe=True, families=[DiscoverableFamily("magician", frozenset(), probe)]
+            )
+        )
+        == 5
+    )
     assert most == 1
 
 
@@ -297,7 +304,7 @@ async def test_leaving_in_the_middle_of_a_probe_leaves_nothing_behind() -> None:
         raise AssertionError
 
     sources = [Listed("one", [way("udp://10.0.0.1")])]
-    families = [Family("magician", frozenset(), probe)]
+    families = [DiscoverableFamily("magician", frozenset(), probe)]
     search = asyncio.create_task(everything(sources=sources, probe=True, families=families))
     await begun.wait()
     search.cancel()
@@ -348,7 +355,7 @@ async def test_the_ports_of_this_computer_can_be_listed() -> None:
 
 
 async def test_another_family_brings_its_own_ids() -> None:
-    families = (*FAMILIES, Family("other", frozenset({(0x2341, 0x0043)})))
+    families = (*FAMILIES, DiscoverableFamily("other", frozenset({(0x2341, 0x0043)})))
     ports = [port("COM1", (0x2341, 0x0043))]
     (found,) = await everything(sources=[SerialPorts(families, lambda: ports)])
     assert found.families == ("other",)
@@ -401,7 +408,7 @@ async def arms(count: int) -> AsyncIterator[tuple[list[Simulation], list[tuple[s
         yield sims, places
 
 
-async def first(source: Source, count: int = 1) -> list[Found]:
+async def first(source: DiscoverySource, count: int = 1) -> list[Found]:
     """The first that a source yields; there is time enough for the slowest machine."""
     found: list[Found] = []
     async with aclosing(source.search(60)) as search:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from dobot_async.arms.bridge_adapter import Bridged
+from dobot_async.arms.bridge_adapter import BridgeAdapter
 from dobot_async.arms.mycobot.models import MODELS
 from dobot_async.arms.registry import REGISTERED, Each, Parts, families, homes
 
@@ -125,7 +125,7 @@ def test_what_each_family_says_of_itself_is_there(part: str) -> None:
 
 def test_the_models_are_those_of_the_family() -> None:
     assert dict(families())["mycobot"].models == tuple(MODELS)
-    bridged: Parts[Bridged[Any]] = Parts("bridge")
+    bridged: Parts[BridgeAdapter[Any]] = Parts("bridge")
     assert [bridged[name].model for name in MODELS] == list(MODELS)
     assert bridged["mycobot"].model == "mycobot280"
 

@@ -16,12 +16,12 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.contract import Encoder, Frame, Parser
 from dobot_async._core.protocol.transport import Transport
 
-__all__ = ["Bridged", "ByKey", "Kind", "Reading", "Switch", "Watch"]
+__all__ = ["BridgeAdapter", "ByKey", "ClientWatch", "RequestKind", "Switch", "TelemetryRead"]
 
 F = TypeVar("F", bound=Frame)
 
 
-class Kind(enum.Enum):
+class RequestKind(enum.Enum):
     """What a request is to a bridge."""
 
     READ = "read"
@@ -34,7 +34,7 @@ class Kind(enum.Enum):
     """Switches off what burns or turns; anybody may send it, and it goes ahead of everything. Nothing else changes."""
 
 
-class Watch(Protocol[F]):
+class ClientWatch(Protocol[F]):
     """What one program has made the arm do."""
 
     @property
@@ -53,7 +53,7 @@ class Watch(Protocol[F]):
         ...
 
     def off(self) -> Sequence[F]:
-        """Returns what ends, beside `Bridged.stopping`, what the program may have switched on."""
+        """Returns what ends, beside `BridgeAdapter.stopping`, what the program may have switched on."""
         ...
 
 
@@ -97,7 +97,7 @@ class Switch:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading(Generic[F]):
+class TelemetryRead(Generic[F]):
     """Something that a bridge reads by itself, for those who only look.
 
     Attributes:
@@ -111,7 +111,7 @@ class Reading(Generic[F]):
     tell: Callable[[F], Mapping[str, Any]]
 
 
-class Bridged(Protocol[F]):
+class BridgeAdapter(Protocol[F]):
     """One family."""
 
     @property
@@ -164,8 +164,8 @@ class Bridged(Protocol[F]):
         ...
 
     @property
-    def readings(self) -> Mapping[str, Reading[F]]:
-        """What those who only look may like to know, by name; "motion" asks the question of a `Watch`."""
+    def readings(self) -> Mapping[str, TelemetryRead[F]]:
+        """What those who only look may like to know, by name; "motion" asks the question of a `ClientWatch`."""
         ...
 
     @property
@@ -192,11 +192,11 @@ class Bridged(Protocol[F]):
     def attach(self, link: Link[F], parser: Parser[F]) -> None:
         """Called with a new link to the arm, and the parser of what it sends."""
 
-    def watch(self) -> Watch[F]:
+    def watch(self) -> ClientWatch[F]:
         """Returns what follows one program."""
         ...
 
-    def kind(self, request: F) -> Kind:
+    def kind(self, request: F) -> RequestKind:
         """Returns what a request is."""
         ...
 

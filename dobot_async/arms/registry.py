@@ -36,10 +36,10 @@ class Family:
         public: The names that it adds to the package, by the modules that they are in.
         simulator: Makes a simulated arm, from a clock.
         scene: A `dobot_async.simulator.scene.SceneArm`, from a simulated arm.
-        bridge: A `dobot_async.arms.bridge_adapter.Bridged`.
-        discovery: A `dobot_async.discovery.families.Family`.
-        cli: A `dobot_async.cli.family.Family`.
-        fleet: A `dobot_async.fleet.families.Family`.
+        bridge: A `dobot_async.arms.bridge_adapter.BridgeAdapter`.
+        discovery: A `dobot_async.discovery.families.DiscoverableFamily`.
+        cli: A `dobot_async.cli.family.FamilyCommands`.
+        fleet: A `dobot_async.fleet.families.FleetFamily`.
         program: A `dobot_async.program.Vocabulary`.
         replay: A `dobot_async.traces.replay.Retime`, for an arm that tells of its own clock.
     """

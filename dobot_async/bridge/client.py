@@ -21,8 +21,8 @@ from typing import Generic, TypeVar
 
 from dobot_async._core.link.admission import Admission
 from dobot_async._core.protocol.contract import Frame
-from dobot_async.arms.bridge_adapter import Bridged, Kind, Watch
-from dobot_async.bridge.desk import Desk, Refused, Request
+from dobot_async.arms.bridge_adapter import BridgeAdapter, ClientWatch, RequestKind
+from dobot_async.bridge.desk import ClientRequest, RequestHandler, RequestRefused
 from dobot_async.bridge.limits import Allowance, Limits
 from dobot_async.errors import DobotError
 
@@ -53,8 +53,8 @@ class Client(Generic[F]):
 
     def __init__(
         self,
-        desk: Desk[F],
-        family: Bridged[F],
+        desk: RequestHandler[F],
+        family: BridgeAdapter[F],
         deliver: Callable[[bytes], None],
         hang_up: Callable[[], None],
         *,
@@ -67,7 +67,7 @@ class Client(Generic[F]):
         self.gone = False
         self.left = False
         self.ordered = ordered
-        self.watch: Watch[F] = family.watch()
+        self.watch: ClientWatch[F] = family.watch()
         self.reads = Admission(ON_THE_LINE)
         self._desk = desk
         self._family = family
@@ -78,7 +78,7 @@ class Client(Generic[F]):
         self._loop = asyncio.get_running_loop()
         self._parser = family.requests()
         self._inbox = bytearray()
-        self._waiting: deque[Request[F]] = deque()
+        self._waiting: deque[ClientRequest[F]] = deque()
         self._bytes = Allowance(limits.data, self._loop.time)
         self._frames = Allowance(limits.frames, self._loop.time)
         self._room = asyncio.Semaphore(AT_ONCE)
@@ -92,9 +92,9 @@ class Client(Generic[F]):
         self._heard = self._loop.time()
         self._requests: set[asyncio.Task[None]] = set()
         self._writing: asyncio.Task[None] | None = None
-        self._unsent: dict[Hashable, Request[F]] = {}
+        self._unsent: dict[Hashable, ClientRequest[F]] = {}
         self._stopping: set[bytes] = set()
-        self._unanswered: deque[Request[F]] = deque()
+        self._unanswered: deque[ClientRequest[F]] = deque()
         self._work = self._loop.create_task(self._run(), name=f"dobot_async bridge {name}")
         self._work.add_done_callback(self._ended)
 
@@ -132,7 +132,7 @@ class Client(Generic[F]):
         self.gone = self.left = True
         self._work.cancel()
 
-    async def take_turn(self, request: Request[F]) -> None:
+    async def take_turn(self, request: ClientRequest[F]) -> None:
         """Waits until what the client has asked before is on the arm's line.
 
         The arm answers in order, and so the client is answered: it takes an answer that comes in front of another one
@@ -141,16 +141,16 @@ class Client(Generic[F]):
         await self._order.acquire()
         request.in_turn = True
 
-    def end_turn(self, request: Request[F]) -> None:
+    def end_turn(self, request: ClientRequest[F]) -> None:
         """A request is sent now, or will never be; may be called again."""
         if request.in_turn:
             request.in_turn = False
             self._order.release()
 
-    def sending(self, request: Request[F]) -> None:
+    def sending(self, request: ClientRequest[F]) -> None:
         """A read is sent now: what is repeated from here on is asked anew."""
         if self.gone:
-            raise Refused("the client has gone")
+            raise RequestRefused("the client has gone")
 
         self.end_turn(request)
         self._forget(request)
@@ -214,14 +214,14 @@ class Client(Generic[F]):
     def _sort(self, frames: list[F]) -> None:
         """Lets requests wait; not what stops the arm."""
         for frame in frames:
-            request = Request(frame, self._family.kind(frame), self._desk.stops)
-            if request.kind is Kind.READ:
+            request = ClientRequest(frame, self._family.kind(frame), self._desk.stops)
+            if request.kind is RequestKind.READ:
                 self._ask(request)
                 continue
 
             self._unsent.clear()
             stop = bytes(frame)
-            if request.kind is Kind.WRITE:
+            if request.kind is RequestKind.WRITE:
                 self._take(request)
             elif stop not in self._stopping:
                 self._stopping.add(stop)
@@ -231,7 +231,7 @@ class Client(Generic[F]):
                 # The same stop again tells the arm nothing new while it has not answered the first one.
                 self._take(request)
 
-    def _ask(self, request: Request[F]) -> None:
+    def _ask(self, request: ClientRequest[F]) -> None:
         """Lets a read wait, or joins it with the one before it if that is the same and waits as well."""
         last = self._unsent.get(request.frame.key)
         if last and last.frame == request.frame and last.times < MOST_TIMES:
@@ -241,7 +241,7 @@ class Client(Generic[F]):
             self._unsent = {request.frame.key: request}
             self._take(request)
 
-    def _take(self, request: Request[F]) -> None:
+    def _take(self, request: ClientRequest[F]) -> None:
         """Begins with a request, or lets it wait."""
         if self._family.in_order:
             self._unanswered.append(request)
@@ -251,7 +251,7 @@ class Client(Generic[F]):
         else:
             self._waiting.append(request)
 
-    def _forget(self, request: Request[F]) -> None:
+    def _forget(self, request: ClientRequest[F]) -> None:
         """Joins nothing more with a read."""
         if self._unsent.get(request.frame.key) is request:
             del self._unsent[request.frame.key]
@@ -272,21 +272,21 @@ class Client(Generic[F]):
             self._frames.spend(1)
             request = self._waiting.popleft()
             task = self._start(request)
-            self._writing = task if request.kind is Kind.WRITE else None
+            self._writing = task if request.kind is RequestKind.WRITE else None
 
-    def _start(self, request: Request[F]) -> asyncio.Task[None]:
+    def _start(self, request: ClientRequest[F]) -> asyncio.Task[None]:
         task = self._loop.create_task(self._serve(request), name=f"dobot_async bridge request of {self.name}")
         self._requests.add(task)
         task.add_done_callback(self._requests.discard)
         return task
 
-    async def _serve(self, request: Request[F]) -> None:
+    async def _serve(self, request: ClientRequest[F]) -> None:
         """Has a request answered, and hands over the answer."""
         try:
             reply = await self._desk.answer(self, request)
-        except (Refused, DobotError) as error:
+        except (RequestRefused, DobotError) as error:
             self._complain(self._family.name(request.frame), str(error))
-            self._answer(request, self._family.refusal(str(error)) if isinstance(error, Refused) else b"")
+            self._answer(request, self._family.refusal(str(error)) if isinstance(error, RequestRefused) else b"")
             if self._family.in_order and isinstance(error, DobotError):
                 self._drop()
         else:
@@ -298,7 +298,7 @@ class Client(Generic[F]):
             else:
                 self._room.release()
 
-    def _answer(self, request: Request[F], answer: bytes) -> None:
+    def _answer(self, request: ClientRequest[F], answer: bytes) -> None:
         """Tells the client what has become of a request, as soon as it may hear of it."""
         if not self._family.in_order:
             for _ in range(request.times if answer and not self.gone else 0):

@@ -6,22 +6,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from dobot_async._core.protocol.contract import Frame
-from dobot_async.arms.bridge_adapter import Kind
+from dobot_async.arms.bridge_adapter import RequestKind
 
 if TYPE_CHECKING:
     from dobot_async.bridge.client import Client
 
-__all__ = ["Desk", "Refused", "Request"]
+__all__ = ["ClientRequest", "RequestHandler", "RequestRefused"]
 
 F = TypeVar("F", bound=Frame)
 
 
-class Refused(Exception):
+class RequestRefused(Exception):
     """A request is not passed on; the message says why. The client hears it where its protocol has a word for it."""
 
 
 @dataclass(slots=True)
-class Request(Generic[F]):
+class ClientRequest(Generic[F]):
     """A request.
 
     Attributes:
@@ -35,7 +35,7 @@ class Request(Generic[F]):
     """
 
     frame: F
-    kind: Kind
+    kind: RequestKind
     stops: int
     times: int = 1
     ahead: bool = False
@@ -43,13 +43,13 @@ class Request(Generic[F]):
     in_turn: bool = False
 
 
-class Desk(Protocol[F]):
+class RequestHandler(Protocol[F]):
     """Where requests are taken."""
 
     stops: int
     """How often something stopped the arm; what came before the last time is not sent any more."""
 
-    async def answer(self, client: Client[F], request: Request[F]) -> F | None:
+    async def answer(self, client: Client[F], request: ClientRequest[F]) -> F | None:
         """Returns the arm's reply, None where the arm need not answer; raises Refused, or DobotError."""
         ...
 

@@ -39,13 +39,13 @@ from dobot_async.errors import ConnectFailed
 from dobot_async.transports.network import TOKEN as TOKEN_OPTION
 from dobot_async.transports.network import secret
 
-__all__ = ["Doors", "open_doors"]
+__all__ = ["Listeners", "open_doors"]
 
 FORMS = "tcp://127.0.0.1:0, udp://127.0.0.1:0, ws://127.0.0.1:0, zenoh://name or pty"
 
 
 @dataclass(frozen=True, slots=True)
-class Doors:
+class Listeners:
     """Where a bridge listens.
 
     Attributes:
@@ -68,7 +68,7 @@ class Doors:
         certificate: str | Path | None,
         key: str | Path | None,
         origins: Collection[str],
-    ) -> Doors:
+    ) -> Listeners:
         """Checks where to listen, and makes up a token where one is needed and none given.
 
         Raises:
@@ -94,7 +94,7 @@ class Doors:
 
 
 async def open_doors(
-    doors: Doors, host: Bridge[Any], stack: AsyncExitStack, refuse: Callable[[str, str], None]
+    doors: Listeners, host: Bridge[Any], stack: AsyncExitStack, refuse: Callable[[str, str], None]
 ) -> tuple[str, ...]:
     """Lets clients of a host in until the stack is closed; returns the URLs in their order.
 
@@ -108,7 +108,7 @@ async def open_doors(
             if place.scheme == "pty":
                 urls.append(await on_pty(host, stack, lasting=False))
             elif place.scheme == "udp":
-                known = Datagrams(authenticator)
+                known = UDPListener(authenticator)
                 urls.append(
                     await on_udp(host, stack, address=address, port=port, admit=known.admit, crowded=known.crowded)
                 )
@@ -182,7 +182,7 @@ def served_with(certificate: str | Path, key: str | Path | None) -> ssl.SSLConte
     return context
 
 
-class Datagrams:
+class UDPListener:
     """Finds the token in datagrams."""
 
     def __init__(self, authenticator: Authenticator) -> None:

@@ -9,19 +9,19 @@ from typing import Generic, TypeVar
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.contract import Frame
-from dobot_async.arms.bridge_adapter import Bridged
+from dobot_async.arms.bridge_adapter import BridgeAdapter
 from dobot_async.errors import ConnectionLost, ReplyTimeout
 
-__all__ = ["Line"]
+__all__ = ["ArmLink"]
 
 F = TypeVar("F", bound=Frame)
 STOPPED_WITHIN = 1.0  # seconds until what stops the arm is said again
 
 
-class Line(Generic[F]):
+class ArmLink(Generic[F]):
     """Frames of a family, by way of a link."""
 
-    def __init__(self, link: Link[F], family: Bridged[F]) -> None:
+    def __init__(self, link: Link[F], family: BridgeAdapter[F]) -> None:
         self._link = link
         self._family = family
 

@@ -28,12 +28,12 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.contract import Frame, LinkState
 from dobot_async._core.util.events import Events
 from dobot_async._core.util.text import printable
-from dobot_async.arms.bridge_adapter import Bridged, Kind
+from dobot_async.arms.bridge_adapter import BridgeAdapter, RequestKind
 from dobot_async.bridge.client import Client
-from dobot_async.bridge.desk import Refused, Request
+from dobot_async.bridge.desk import ClientRequest, RequestRefused
 from dobot_async.bridge.lease import Lease
 from dobot_async.bridge.limits import Allowance, Limits
-from dobot_async.bridge.line import Line
+from dobot_async.bridge.line import ArmLink
 from dobot_async.bridge.standstill import Standstill
 from dobot_async.errors import ProtocolError, ReplyTimeout
 
@@ -83,7 +83,7 @@ class Bridge(Generic[F]):
     def __init__(
         self,
         link: Link[F],
-        family: Bridged[F],
+        family: BridgeAdapter[F],
         *,
         takeover: bool,
         on_vanish: Literal["stop", "leave"],
@@ -100,7 +100,7 @@ class Bridge(Generic[F]):
         self._limits = limits
         self._clients: set[Client[F]] = set()
         self._ended = False
-        self._line = Line(link, family)
+        self._line = ArmLink(link, family)
         leave = Standstill(self._line, family, self._tell).reach if on_vanish == "stop" else let_finish
         self._lease = Lease(takeover=takeover, leave=leave, cut=self.cut, tell=self._tell)
         self._farewells: set[asyncio.Task[None]] = set()
@@ -179,15 +179,15 @@ class Bridge(Generic[F]):
         """Takes note that somebody was not let in."""
         self._tell("turned away", name, reason)
 
-    async def answer(self, client: Client[F], request: Request[F]) -> F | None:
+    async def answer(self, client: Client[F], request: ClientRequest[F]) -> F | None:
         """Returns the arm's reply; raises Refused, or DobotError if there should be one."""
         if self.family.subject(request.frame) in self._denied:
-            raise Refused("it is denied here")
+            raise RequestRefused("it is denied here")
 
         try:
             self.family.check(request.frame)
         except ProtocolError as error:
-            raise Refused(str(error)) from None
+            raise RequestRefused(str(error)) from None
 
         try:
             return await self._pass_on(client, request)
@@ -221,22 +221,22 @@ class Bridge(Generic[F]):
         self.events.close()
         await self.link.aclose()
 
-    async def _pass_on(self, client: Client[F], request: Request[F]) -> F:
+    async def _pass_on(self, client: Client[F], request: ClientRequest[F]) -> F:
         """Passes a request on in the way of its kind."""
         frame = request.frame
-        if request.kind is Kind.STOP:
+        if request.kind is RequestKind.STOP:
             return await self._stop(client, frame)
 
-        if request.kind is Kind.OFF:
+        if request.kind is RequestKind.OFF:
             return await self._urge(client, frame)
 
         await client.take_turn(request)
         try:
-            return await (self._write if request.kind is Kind.WRITE else self._read)(client, request)
+            return await (self._write if request.kind is RequestKind.WRITE else self._read)(client, request)
         finally:
             client.end_turn(request)
 
-    async def _read(self, client: Client[F], request: Request[F]) -> F:
+    async def _read(self, client: Client[F], request: ClientRequest[F]) -> F:
         """Passes on what changes nothing."""
         frame = request.frame
         if not client.reads.try_acquire(frame.key, Priority.IMMEDIATE):
@@ -263,17 +263,17 @@ class Bridge(Generic[F]):
         client.watch.answered(frame, reply)
         return reply
 
-    async def _write(self, client: Client[F], request: Request[F]) -> F:
+    async def _write(self, client: Client[F], request: ClientRequest[F]) -> F:
         """Passes on what changes something, once, for the holder of the lease."""
         frame = request.frame
         await self._lease.take(client)
 
         def ready() -> None:
             if client.gone or self._lease.holder is not client:
-                raise Refused("the lease has ended")
+                raise RequestRefused("the lease has ended")
 
             if request.stops != self.stops:
-                raise Refused("the arm was stopped before it was sent")
+                raise RequestRefused("the arm was stopped before it was sent")
 
             client.end_turn(request)
             client.watch.sent(frame)

@@ -9,9 +9,9 @@ from contextlib import suppress
 from typing import Generic, TypeVar
 
 from dobot_async._core.protocol.contract import Frame
-from dobot_async.arms.bridge_adapter import Bridged
+from dobot_async.arms.bridge_adapter import BridgeAdapter
 from dobot_async.bridge.client import Client
-from dobot_async.bridge.line import Line
+from dobot_async.bridge.line import ArmLink
 from dobot_async.errors import ConnectionLost, DobotError
 
 __all__ = ["Standstill"]
@@ -30,7 +30,7 @@ class Standstill(Generic[F]):
         tell: Takes note of what happens to whom.
     """
 
-    def __init__(self, line: Line[F], family: Bridged[F], tell: Callable[[str, Client[F], str], None]) -> None:
+    def __init__(self, line: ArmLink[F], family: BridgeAdapter[F], tell: Callable[[str, Client[F], str], None]) -> None:
         self._line = line
         self._family = family
         self._tell = tell

@@ -11,8 +11,8 @@ from typing import Any, Literal, TypeVar
 from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.contract import Frame
 from dobot_async._core.util.tasks import run_shielded
-from dobot_async.arms.bridge_adapter import Bridged
-from dobot_async.bridge.doors import Doors, open_doors
+from dobot_async.arms.bridge_adapter import BridgeAdapter
+from dobot_async.bridge.doors import Listeners, open_doors
 from dobot_async.bridge.families import family_of
 from dobot_async.bridge.limits import Limits
 from dobot_async.bridge.service import Bridge
@@ -67,7 +67,7 @@ async def bridge(
         raise ValueError(f'expected deny to be of {", ".join(known.denials)}, and on_vanish "stop" or "leave"')
 
     limits = limits or Limits()
-    doors = Doors.of([listen] if isinstance(listen, str) else listen, token, certificate, key, origins)
+    doors = Listeners.of([listen] if isinstance(listen, str) else listen, token, certificate, key, origins)
     if known.in_order and any(place.scheme == "udp" for place in doors.places):
         raise ValueError(
             f"{family} cannot be bridged to udp: nothing but their order tells whose its answers are, and datagrams "
@@ -92,7 +92,7 @@ async def bridge(
         yield running
 
 
-async def linked(url: str, family: Bridged[F], timeout: float) -> Link[F]:
+async def linked(url: str, family: BridgeAdapter[F], timeout: float) -> Link[F]:
     """Opens the link to the arm, which reopens itself if it breaks."""
     transport = await family.open(url, timeout)
     # `ble:` may be any arm at first, but not another one later.
@@ -103,7 +103,7 @@ async def linked(url: str, family: Bridged[F], timeout: float) -> Link[F]:
     return link
 
 
-async def greet(link: Link[F], family: Bridged[F], timeout: float) -> None:
+async def greet(link: Link[F], family: BridgeAdapter[F], timeout: float) -> None:
     """Proves that an arm answers."""
     frame = family.greeting
     try:

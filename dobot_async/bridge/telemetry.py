@@ -15,11 +15,11 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from dobot_async.arms.bridge_adapter import Reading
+from dobot_async.arms.bridge_adapter import TelemetryRead
 from dobot_async.bridge.service import Bridge
 from dobot_async.errors import DobotError
 from dobot_async.transports.zenoh.config import library
-from dobot_async.transports.zenoh.session import Keys, Session
+from dobot_async.transports.zenoh.session import KeyExpressions, ZenohSession
 
 __all__ = ["LINK_PERIOD", "Telemetry"]
 
@@ -35,7 +35,7 @@ class Topic:
         watched: Set while somebody subscribes.
     """
 
-    def __init__(self, session: Session, key: str) -> None:
+    def __init__(self, session: ZenohSession, key: str) -> None:
         zenoh = library()
         self.watched = asyncio.Event()
         self.publisher = session.raw.declare_publisher(
@@ -59,7 +59,7 @@ class Topic:
 class Telemetry:
     """Publishes what an arm does, from `start` to `aclose`."""
 
-    def __init__(self, bridge: Bridge[Any], session: Session, keys: Keys) -> None:
+    def __init__(self, bridge: Bridge[Any], session: ZenohSession, keys: KeyExpressions) -> None:
         self._bridge = bridge
         self._session = session
         self._keys = keys
@@ -67,7 +67,7 @@ class Telemetry:
 
     def start(self) -> None:
         """Begins."""
-        readings: Mapping[str, Reading[Any] | None] = {**self._bridge.family.readings, "link": None}
+        readings: Mapping[str, TelemetryRead[Any] | None] = {**self._bridge.family.readings, "link": None}
         for name, reading in readings.items():
             topic = Topic(self._session, self._keys.reading(name))
             work = self._publish(topic, name, reading)
@@ -81,7 +81,7 @@ class Telemetry:
         if self._tasks:
             await asyncio.wait(self._tasks)
 
-    async def _publish(self, topic: Topic, name: str, reading: Reading[Any] | None) -> None:
+    async def _publish(self, topic: Topic, name: str, reading: TelemetryRead[Any] | None) -> None:
         """Publishes one reading after the other while somebody wants it."""
         while True:
             await topic.watched.wait()
@@ -94,7 +94,7 @@ class Telemetry:
             topic.publisher.put(json.dumps({"time": time.time(), **told}))
             await asyncio.sleep(reading.period if reading else LINK_PERIOD)
 
-    async def _read(self, name: str, reading: Reading[Any]) -> dict[str, Any]:
+    async def _read(self, name: str, reading: TelemetryRead[Any]) -> dict[str, Any]:
         """Asks the arm."""
         reply = await self._bridge.ask(reading.request)
         told = dict(reading.tell(reply))

@@ -3,7 +3,7 @@
     token of a client + its query --> let in --> messages --> Host.client(...).send
     its token goes                --> Host.leave, as if a line were cut
 
-Nothing here waits for a client: what it is answered goes by way of its own `Outbox`, and whatever else it is told is
+Nothing here waits for a client: what it is answered goes by way of its own `SendQueue`, and whatever else it is told is
 little, and dropped if Zenoh cannot take it at once.
 """
 
@@ -26,9 +26,9 @@ from dobot_async.bridge.limits import Allowance
 from dobot_async.bridge.service import Bridge
 from dobot_async.bridge.telemetry import Telemetry
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.zenoh.config import Place, address, library
-from dobot_async.transports.zenoh.messages import DATA, END, Lost, Numbered, Outbox
-from dobot_async.transports.zenoh.session import VERSION, Keys, Session
+from dobot_async.transports.zenoh.config import ZenohConfig, address, library
+from dobot_async.transports.zenoh.messages import DATA, END, Lost, Numbered, SendQueue
+from dobot_async.transports.zenoh.session import VERSION, KeyExpressions, ZenohSession
 
 if TYPE_CHECKING:
     import zenoh
@@ -48,7 +48,7 @@ EVERYWHERE = {"/0.0.0.0:": "/127.0.0.1:", "/[::]:": "/[::1]:"}
 
 async def on_zenoh(bridge: Bridge[Any], stack: AsyncExitStack, url: SplitResult) -> str:
     """Serves an arm on Zenoh until the stack is closed; returns the URL for clients on this computer."""
-    place = Place.of(url, serving=True)
+    place = ZenohConfig.of(url, serving=True)
     place = replace(place, listen=tuple(map(with_port, place.listen)))
     door = Door(bridge, place)
     stack.push_async_callback(door.aclose)
@@ -87,9 +87,9 @@ class Door:
         keys: The keys of the arm.
     """
 
-    def __init__(self, bridge: Bridge[Any], place: Place) -> None:
-        self.keys = Keys(place.name)
-        self.session = Session(place, serving=True)
+    def __init__(self, bridge: Bridge[Any], place: ZenohConfig) -> None:
+        self.keys = KeyExpressions(place.name)
+        self.session = ZenohSession(place, serving=True)
         self.bridge = bridge
         self._name = place.name
         self._present: dict[str, None] = {}
@@ -241,7 +241,7 @@ class Guest:
 
     def __init__(self, door: Door, name: str, shown: str) -> None:
         self.name = name
-        self.outbox = Outbox(door.way(name, waits=True), partial(door.cut, self), name)
+        self.outbox = SendQueue(door.way(name, waits=True), partial(door.cut, self), name)
         self._door = door
         self._numbers = Numbered()
         self._held = False

@@ -26,7 +26,7 @@ from dobot_async.fleet.fleet import Fleet
 from dobot_async.fleet.seat import Member
 from dobot_async.program import VOCABULARIES, ProgramError, Step
 from dobot_async.program.text import shortened
-from dobot_async.program.vocabulary import Reader, bare
+from dobot_async.program.vocabulary import ProgramReader, bare
 
 __all__ = ["CellProgram", "Meeting", "parse_cell_program", "run_cell_program", "word_of"]
 
@@ -140,7 +140,7 @@ class Part:
         self._zones = cell.zones
         self._barriers = barriers
         self._held: set[str] = set()
-        self._reader: Reader = VOCABULARIES[word_of(member)].reader(member.options)
+        self._reader: ProgramReader = VOCABULARIES[word_of(member)].reader(member.options)
 
     def read(self, number: int, text: str, arms: tuple[str, ...]) -> None:
         """Reads a line; raises ValueError or TypeError that says what is wrong."""

@@ -21,14 +21,14 @@ from dobot_async.fleet.families import family_of
 from dobot_async.fleet.seat import Member
 from dobot_async.traces import TraceFile
 
-__all__ = ["Reading", "joined_alone", "observe", "read", "told_by"]
+__all__ = ["CellReading", "joined_alone", "observe", "read", "told_by"]
 
 RETRY = 1.0  # seconds until an arm that did not answer is tried again
 SHORT = re.compile(r"(joint \d+: )?[^:]*")  # of an alarm: cause and remedy would fill the screen
 
 
 @dataclass(slots=True)
-class Reading:
+class CellReading:
     """What an arm of the cell told.
 
     Attributes:
@@ -65,26 +65,26 @@ def joined_alone(
     return found
 
 
-async def read(member: Member[Any], arm: Arm) -> Reading:
+async def read(member: Member[Any], arm: Arm) -> CellReading:
     """Asks an arm for what is shown."""
     pose = await arm.get_pose()
     x, y, z, _ = member.base.to_cell(pose.x, pose.y, pose.z)
     alarms = tuple(map(str, await arm.get_alarms()))
-    return Reading(family_of(member.kind).name, round(x, 3), round(y, 3), round(z, 3), alarms)
+    return CellReading(family_of(member.kind).name, round(x, 3), round(y, 3), round(z, 3), alarms)
 
 
 async def observe(
     cell: Cell,
     rate: float,
     count: int | None,
-    show: Callable[[Mapping[str, Reading]], None],
+    show: Callable[[Mapping[str, CellReading]], None],
     trace: TraceFile | None = None,
 ) -> None:
     """Shows what all arms tell at each tick; arms that do not answer are tried again."""
-    told = {name: Reading(family_of(member.kind).name, error="connecting") for name, member in cell.members.items()}
+    told = {name: CellReading(family_of(member.kind).name, error="connecting") for name, member in cell.members.items()}
     first = {name: asyncio.Event() for name in told}
 
-    def note(name: str, reading: Reading) -> None:
+    def note(name: str, reading: CellReading) -> None:
         told[name] = reading
         first[name].set()
 
@@ -125,7 +125,7 @@ async def follow(
     connected: Callable[[], AbstractAsyncContextManager[Any]],
     member: Member[Any],
     interval: float,
-    note: Callable[[Reading], None],
+    note: Callable[[CellReading], None],
 ) -> None:
     """Notes what one arm tells, for ever."""
     while True:
@@ -139,9 +139,9 @@ async def follow(
             await anyio.sleep(RETRY)
 
 
-def told_by(member: Member[Any], answer: Reading | BaseException) -> Reading:
+def told_by(member: Member[Any], answer: CellReading | BaseException) -> CellReading:
     """What an arm told, or why it did not."""
     if isinstance(answer, BaseException):
-        return Reading(family_of(member.kind).name, error=str(answer))
+        return CellReading(family_of(member.kind).name, error=str(answer))
 
     return answer

@@ -16,7 +16,7 @@ from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.arms.ultraarm.limits import MANUAL_LIMITS
 from dobot_async.cli.drawing_options import Begin
 from dobot_async.cli.failures import StepRefused, WrongFile
-from dobot_async.cli.session import Session
+from dobot_async.cli.session import CommandSession
 from dobot_async.toolpath import (
     Drawing,
     Progress,
@@ -50,7 +50,7 @@ class Job:
         options: Of a `Drawing`.
     """
 
-    session: Session
+    session: CommandSession
     name: str
     tool: Tool
     path: Toolpath

@@ -6,21 +6,21 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-__all__ = ["Family", "Pieces", "Reading", "Told"]
+__all__ = ["CommandAnswer", "FamilyCommands", "MonitorReading", "Pieces"]
 
 Pieces = Callable[[bytes], Iterator[dict[str, Any]]]
 """Yields what bytes consist of, in order: each with "offset" and "raw", and "junk" (the reason) or what it says."""
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class CommandAnswer:
     """An answer: as JSON, and in words."""
 
     value: Any
     text: str
 
 
-class Reading(Protocol):
+class MonitorReading(Protocol):
     """What an arm told at one time."""
 
     @property
@@ -30,7 +30,7 @@ class Reading(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Family:
+class FamilyCommands:
     """One family of arms.
 
     Attributes:
@@ -51,9 +51,9 @@ class Family:
     """
 
     kind: Any
-    info: Callable[[Any], Awaitable[Told]]
-    pose: Callable[[Any], Awaitable[Told]]
-    read: Callable[[Any], Awaitable[Reading]]
+    info: Callable[[Any], Awaitable[CommandAnswer]]
+    pose: Callable[[Any], Awaitable[CommandAnswer]]
+    read: Callable[[Any], Awaitable[MonitorReading]]
     move: Callable[[Any, Sequence[float], str], Awaitable[None]]
     modes: Sequence[str]
     jog: Callable[[Any, Any, float], Awaitable[None]]

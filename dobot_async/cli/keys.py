@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from dobot_async._core.util.tasks import cancel_and_join
 
-__all__ = ["HOLD", "Key", "Keys", "keys_of", "until_a_key"]
+__all__ = ["HOLD", "Key", "KeyReader", "keys_of", "until_a_key"]
 
 HOLD = 0.15
 """Seconds: repetitions are 25 to 50 ms apart on most systems."""
@@ -57,7 +57,7 @@ class Key(NamedTuple):
     time: float
 
 
-class Keys:
+class KeyReader:
     """The keys of a terminal; made by `keys_of`."""
 
     def __init__(self, descriptor: int) -> None:
@@ -155,7 +155,7 @@ class Keys:
 
 
 @contextmanager
-def keys_of(stream: Any = None) -> Generator[Keys]:
+def keys_of(stream: Any = None) -> Generator[KeyReader]:
     """Read the keys of a terminal for the length of a block, standard input's by default.
 
     Ctrl-C interrupts as ever. Ctrl-Z and Ctrl-S do nothing: a program that is suspended, or whose terminal stands,
@@ -181,7 +181,7 @@ def keys_of(stream: Any = None) -> Generator[Keys]:
                 mode[6][getattr(termios, name)] = os.fpathconf(descriptor, "PC_VDISABLE").to_bytes(1, "little")
 
         termios.tcsetattr(descriptor, termios.TCSANOW, mode)
-        keys = Keys(descriptor)
+        keys = KeyReader(descriptor)
         try:
             yield keys
         finally:

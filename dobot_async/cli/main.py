@@ -20,7 +20,7 @@ from dobot_async.cli.failures import FAILED, OUTPUT_CLOSED, Interrupted
 from dobot_async.errors import DobotError
 
 if TYPE_CHECKING:
-    from dobot_async.cli.session import Session
+    from dobot_async.cli.session import CommandSession
 
 __all__ = ["COMMANDS", "cli"]
 
@@ -179,7 +179,7 @@ def note(ctx: click.Context, option: click.Parameter, value: Any) -> None:
         take(ctx.obj, option.name, value)
 
 
-def take(session: Session, name: str, value: Any) -> None:
+def take(session: CommandSession, name: str, value: Any) -> None:
     """Takes the value of a global option."""
     from dobot_async.cli.output import Output
 
@@ -204,11 +204,11 @@ def cli(ctx: click.Context, /, **options: Any) -> None:
     usage, and nothing was sent, 130 Ctrl-C. Ctrl-C stops the arm first.
     """
     from dobot_async.cli.output import Output
-    from dobot_async.cli.session import Session
+    from dobot_async.cli.session import CommandSession
 
     # What is of interest is told in one line at the end; without a handler Python writes warnings to standard error.
     logging.getLogger("dobot_async").addHandler(SILENT)
-    ctx.obj = Session(os.environ.get("DOBOT_URL") or None, "magician", None, Output(as_json=False))
+    ctx.obj = CommandSession(os.environ.get("DOBOT_URL") or None, "magician", None, Output(as_json=False))
     for name, value in options.items():
         if value:
             take(ctx.obj, name, value)

@@ -24,8 +24,8 @@ __all__ = [
     "NOT_BELOW_ZERO",
     "PERCENT",
     "PROGRAM",
-    "Place",
-    "Text",
+    "AddressType",
+    "TextSource",
     "standard_input",
 ]
 
@@ -33,7 +33,7 @@ PORTS = range(1 << 16)
 MOST_SECONDS = 86400.0  # a day
 
 
-class Place(click.ParamType[tuple[str, int]]):
+class AddressType(click.ParamType[tuple[str, int]]):
     """An IPv4 address, with the port where modules are asked unless it has one of its own."""
 
     name = "address"
@@ -94,7 +94,7 @@ class FiniteNumber(click.ParamType[float]):
         return EVERY.convert(value, param, ctx)
 
 
-class Text(NamedTuple):
+class TextSource(NamedTuple):
     """The text of a file.
 
     Attributes:
@@ -106,19 +106,19 @@ class Text(NamedTuple):
     text: str
 
 
-class TextFile(click.ParamType[Text]):
+class TextFile(click.ParamType[TextSource]):
     """A file of UTF-8 text, or - for standard input; read before anything else is done."""
 
     name = "file"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Text:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> TextSource:
         """Reads the file."""
-        if isinstance(value, Text):
+        if isinstance(value, TextSource):
             return value
 
         name = "standard input" if value == "-" else click.format_filename(value)
         try:
-            return Text(name, read_text(standard_input() if value == "-" else Path(value)))
+            return TextSource(name, read_text(standard_input() if value == "-" else Path(value)))
         except OSError as error:
             self.fail(f"{name}: {error.strerror or error}", param, ctx)
         except ValueError as error:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dobot_async._core.util.tasks import cancel_and_join
-from dobot_async.cli.keys import Key, Keys
+from dobot_async.cli.keys import Key, KeyReader
 from dobot_async.errors import ArmAlarm, CommandRejected, MotionStopped, UnsupportedError
 from dobot_async.teaching import Recorder, TaughtStep, play
 from dobot_async.teaching.base import TaughtArm
@@ -50,7 +50,7 @@ class Pendant:
 
     recorder: Recorder
     taught: TaughtArm
-    keys: Keys
+    keys: KeyReader
     say: Callable[[str], None]
     speed: float
     by_joints: bool = False

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from dobot_async.cli.failures import StepRefused, WrongFile
-from dobot_async.cli.params import Text
+from dobot_async.cli.params import TextSource
 from dobot_async.program import ProgramError, Step
 
 __all__ = ["checked", "execute", "wrong"]
 
 
-def checked(file: Text, parse: Callable[[], Sequence[Step]]) -> Sequence[Step]:
+def checked(file: TextSource, parse: Callable[[], Sequence[Step]]) -> Sequence[Step]:
     """Returns the steps of a program; raises WrongFile with the line if one is wrong."""
     try:
         steps = parse()
@@ -25,7 +25,7 @@ def checked(file: Text, parse: Callable[[], Sequence[Step]]) -> Sequence[Step]:
     return steps
 
 
-def wrong(file: Text, why: str) -> WrongFile:
+def wrong(file: TextSource, why: str) -> WrongFile:
     """What is raised for a wrong program."""
     return WrongFile(f"{file.name}: {why}; nothing was sent")
 

@@ -20,13 +20,13 @@ import click
 from dobot_async.cli.arms import FAMILIES
 from dobot_async.cli.credentials import with_token
 from dobot_async.cli.failures import Interrupted
-from dobot_async.cli.family import Family
+from dobot_async.cli.family import FamilyCommands
 from dobot_async.cli.output import Output
 from dobot_async.cli.trace import tracing
 from dobot_async.program import VOCABULARIES, Vocabulary
 from dobot_async.transports import SCHEMES
 
-__all__ = ["Session", "run"]
+__all__ = ["CommandSession", "run"]
 
 T = TypeVar("T")
 
@@ -35,7 +35,7 @@ SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SI
 
 
 @dataclass(slots=True)
-class Session:
+class CommandSession:
     """What the global options say, before the command or behind it.
 
     Attributes:
@@ -57,7 +57,7 @@ class Session:
     given: set[str] = field(default_factory=set[str])
 
     @property
-    def family(self) -> Family:
+    def family(self) -> FamilyCommands:
         """The arm's family."""
         return FAMILIES[self.arm]
 

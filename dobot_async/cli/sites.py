@@ -12,8 +12,8 @@ import click
 
 from dobot_async.cli.credentials import token_in_file
 from dobot_async.cli.failures import WrongFile
-from dobot_async.cli.params import FINITE, PERCENT, PROGRAM, Text
-from dobot_async.cli.session import Session
+from dobot_async.cli.params import FINITE, PERCENT, PROGRAM, TextSource
+from dobot_async.cli.session import CommandSession
 
 if TYPE_CHECKING:
     from dobot_async.fleet.cell import Cell
@@ -57,7 +57,7 @@ def names_of(given: Mapping[str, Any]) -> list[str]:
     return [given["name"]] if given["cell"] is None else list(cell_of(given["cell"]).members)
 
 
-def cell_of(text: Text) -> Cell:
+def cell_of(text: TextSource) -> Cell:
     """The cell of a file."""
     from dobot_async.fleet.cell import parse_cell
 
@@ -67,7 +67,7 @@ def cell_of(text: Text) -> Cell:
         raise WrongFile(f"{text.name}: {error}; nothing was sent") from None
 
 
-def site_of(session: Session, given: Mapping[str, Any]) -> AbstractAsyncContextManager[Site]:
+def site_of(session: CommandSession, given: Mapping[str, Any]) -> AbstractAsyncContextManager[Site]:
     """Return what connects to the arms.
 
     Raises:
@@ -91,7 +91,7 @@ def site_of(session: Session, given: Mapping[str, Any]) -> AbstractAsyncContextM
     return open_site(cell_of(cell), **options)
 
 
-def member(session: Session) -> Member[Any]:
+def member(session: CommandSession) -> Member[Any]:
     """The arm at --url."""
     from dobot_async import MyCobot
     from dobot_async.fleet.member import Member

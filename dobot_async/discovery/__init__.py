@@ -20,16 +20,16 @@ from types import MappingProxyType
 from urllib.parse import urlsplit
 
 from dobot_async.discovery.ble import BLEModules
-from dobot_async.discovery.families import FAMILIES, Family
-from dobot_async.discovery.found import DiscoveryProblem, Found, Source, natural
+from dobot_async.discovery.families import FAMILIES, DiscoverableFamily
+from dobot_async.discovery.found import DiscoveryProblem, DiscoverySource, Found, natural
 from dobot_async.discovery.serial_ports import SerialPorts
 from dobot_async.discovery.wifi import WiFiModules
 from dobot_async.discovery.zenoh import ZenohArms
 from dobot_async.errors import DobotError
 
-__all__ = ["SOURCES", "DiscoveryProblem", "Found", "Source", "discover"]
+__all__ = ["SOURCES", "DiscoveryProblem", "DiscoverySource", "Found", "discover"]
 
-SOURCES: Mapping[str, Source] = MappingProxyType(
+SOURCES: Mapping[str, DiscoverySource] = MappingProxyType(
     {source.name: source for source in (SerialPorts(), WiFiModules(), BLEModules(), ZenohArms(required=False))}
 )
 """The sources, by name, in the order in which they tell."""
@@ -41,10 +41,10 @@ PATIENCE = 5.0  # seconds that a source may need on top, to begin and to clean u
 def discover(
     *,
     timeout: float = 3.0,
-    sources: Iterable[str | Source] = tuple(SOURCES),
+    sources: Iterable[str | DiscoverySource] = tuple(SOURCES),
     probe: bool = False,
     probe_timeout: float = 10.0,
-    families: Iterable[Family] = FAMILIES,
+    families: Iterable[DiscoverableFamily] = FAMILIES,
     on_problem: Callable[[DiscoveryProblem], None] | None = None,
 ) -> AsyncGenerator[Found, None]:
     """Searches for arms, and yields each once.
@@ -76,7 +76,7 @@ def discover(
     return merged([partial(probed, source, search, families, probe_timeout) for source in chosen])
 
 
-def named(name: str) -> Source:
+def named(name: str) -> DiscoverySource:
     """The source of a name."""
     if name not in SOURCES:
         raise ValueError(f"no source of arms is called {name!r}; there are: {', '.join(SOURCES)}")
@@ -126,7 +126,9 @@ def same_arm(arm: Found, other: Found) -> bool:
     )
 
 
-async def collected(source: Source, *, timeout: float, tell: Callable[[DiscoveryProblem], None]) -> list[Found]:
+async def collected(
+    source: DiscoverySource, *, timeout: float, tell: Callable[[DiscoveryProblem], None]
+) -> list[Found]:
     """Returns what a source has found, sorted, when it has ended; tells what went wrong."""
     found: dict[str, Found] = {}
     limit = asyncio.timeout(timeout + PATIENCE)
@@ -142,7 +144,10 @@ async def collected(source: Source, *, timeout: float, tell: Callable[[Discovery
 
 
 async def probed(
-    source: Source, search: Callable[[Source], Awaitable[list[Found]]], families: Iterable[Family], timeout: float
+    source: DiscoverySource,
+    search: Callable[[DiscoverySource], Awaitable[list[Found]]],
+    families: Iterable[DiscoverableFamily],
+    timeout: float,
 ) -> list[Found]:
     """Returns what a source has found, with what each arm says of itself."""
     turns = asyncio.Semaphore(source.probes_at_once)
@@ -154,7 +159,7 @@ async def probed(
     return await asyncio.gather(*map(ask, await search(source)))
 
 
-async def asked(found: Found, families: Iterable[Family], timeout: float) -> Found:
+async def asked(found: Found, families: Iterable[DiscoverableFamily], timeout: float) -> Found:
     """Asks what was found who it is: as each family that it can be, until it answers."""
     problems: list[str] = []
     for family in families:

@@ -17,7 +17,7 @@ from dobot_async.arms.registry import Each
 from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import CommandRejected, ConnectFailed
 
-__all__ = ["CH340", "CH9102", "CP210X", "FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "Family"]
+__all__ = ["CH340", "CH9102", "CP210X", "FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "DiscoverableFamily"]
 
 CP210X = 0x10C4, 0xEA60
 CH340 = 0x1A86, 0x7523
@@ -26,7 +26,7 @@ ONE_FOR_EACH_NUMBER_OF_JOINTS = ("mycobot280", "myarm300", "mypalletizer260")
 
 
 @dataclass(frozen=True, slots=True)
-class Family:
+class DiscoverableFamily:
     """A family of arms.
 
     Attributes:
@@ -79,8 +79,8 @@ async def probe_ultraarm(url: str, timeout: float) -> DeviceInfo:
     return DeviceInfo(serial_number="", name="", version=version)
 
 
-MAGICIAN = Family("magician", frozenset({CP210X, CH340, CH9102}), probe_magician)
-MYCOBOT = Family("mycobot", frozenset({CP210X, CH9102}), probe_mycobot)
-ULTRAARM = Family("ultraarm", frozenset({CH340}), probe_ultraarm)
-FAMILIES: Each[Family] = Each("discovery")
+MAGICIAN = DiscoverableFamily("magician", frozenset({CP210X, CH340, CH9102}), probe_magician)
+MYCOBOT = DiscoverableFamily("mycobot", frozenset({CP210X, CH9102}), probe_mycobot)
+ULTRAARM = DiscoverableFamily("ultraarm", frozenset({CH340}), probe_ultraarm)
+FAMILIES: Each[DiscoverableFamily] = Each("discovery")
 """In the order in which they are tried."""

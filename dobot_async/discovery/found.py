@@ -9,7 +9,7 @@ from typing import Protocol
 
 from dobot_async.arms.info import DeviceInfo
 
-__all__ = ["DiscoveryProblem", "Found", "Source", "natural", "printable"]
+__all__ = ["DiscoveryProblem", "DiscoverySource", "Found", "natural", "printable"]
 
 DIGITS = re.compile(r"(\d+)")
 
@@ -54,7 +54,7 @@ class DiscoveryProblem:
     error: Exception
 
 
-class Source(Protocol):
+class DiscoverySource(Protocol):
     """One way to search.
 
     Attributes:

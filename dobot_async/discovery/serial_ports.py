@@ -7,13 +7,13 @@ from typing import Protocol
 
 from anyio import to_thread
 
-from dobot_async.discovery.families import FAMILIES, Family
+from dobot_async.discovery.families import FAMILIES, DiscoverableFamily
 from dobot_async.discovery.found import Found, printable
 
-__all__ = ["Port", "SerialPorts"]
+__all__ = ["SerialPort", "SerialPorts"]
 
 
-class Port(Protocol):
+class SerialPort(Protocol):
     """What pyserial tells of a port."""
 
     device: str
@@ -35,7 +35,7 @@ class SerialPorts:
     probes_at_once = 8
 
     def __init__(
-        self, families: Iterable[Family] = FAMILIES, ports: Callable[[], Iterable[Port]] | None = None
+        self, families: Iterable[DiscoverableFamily] = FAMILIES, ports: Callable[[], Iterable[SerialPort]] | None = None
     ) -> None:
         self._families = families
         self._ports = ports or list_ports
@@ -54,9 +54,9 @@ class SerialPorts:
                 )
 
 
-def list_ports() -> Iterable[Port]:
+def list_ports() -> Iterable[SerialPort]:
     """The ports of this computer, by name, so that the same one of two for one device wins each time."""
     from serial.tools.list_ports import comports
 
-    ports: Iterable[Port] = sorted(comports(), key=lambda port: port.device, reverse=True)
+    ports: Iterable[SerialPort] = sorted(comports(), key=lambda port: port.device, reverse=True)
     return ports

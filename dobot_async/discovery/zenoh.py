@@ -42,8 +42,8 @@ class ZenohArms:
             ValueError: The configuration is no good.
             ConnectFailed: There is no Zenoh, or it cannot be started.
         """
-        from dobot_async.transports.zenoh.config import Place, library
-        from dobot_async.transports.zenoh.session import Keys, Session
+        from dobot_async.transports.zenoh.config import ZenohConfig, library
+        from dobot_async.transports.zenoh.session import KeyExpressions, ZenohSession
 
         try:
             library()
@@ -55,12 +55,12 @@ class ZenohArms:
 
         end = asyncio.get_running_loop().time() + timeout
         arrived: asyncio.Queue[str] = asyncio.Queue()
-        session = Session(Place("*", self._config, self._connect))
+        session = ZenohSession(ZenohConfig("*", self._config, self._connect))
 
         def begin(opened: zenoh.Session) -> None:
             put = library().SampleKind.PUT
             opened.liveliness().declare_subscriber(
-                f"{Keys('*').arm}/*/*",
+                f"{KeyExpressions('*').arm}/*/*",
                 session.crossing.to(
                     arrived.put_nowait, lambda sample: str(sample.key_expr) if sample.kind == put else ""
                 ),

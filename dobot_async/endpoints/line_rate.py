@@ -16,7 +16,7 @@ from typing import Generic, TypeVar
 
 from dobot_async.endpoints.listeners import Host, Peer
 
-__all__ = ["AtBaud", "SerialLine"]
+__all__ = ["RateLimited", "RateLimitedLine"]
 
 P = TypeVar("P", bound=Peer)
 BITS = 10  # start, eight of data, stop
@@ -24,7 +24,7 @@ PIECE = 0.001  # seconds
 AHEAD = 1 << 12  # bytes that a client may write ahead of its line, as a system's serial driver lets it
 
 
-class SerialLine:
+class RateLimitedLine:
     """One direction: carries bytes from `send` to `deliver`.
 
     Args:
@@ -87,9 +87,9 @@ class Wired(Generic[P]):
         hold: Callable[[bool], None],
         leave: Callable[[P], None],
     ) -> None:
-        self.back = SerialLine(baud, deliver)
+        self.back = RateLimitedLine(baud, deliver)
         self.peer: P | None = None
-        self._there = SerialLine(baud, self._arrived)
+        self._there = RateLimitedLine(baud, self._arrived)
         self._hang_up = hang_up
         self._hold = hold
         self._leave = leave
@@ -143,7 +143,7 @@ class Wired(Generic[P]):
             self._hold(held)
 
 
-class AtBaud(Generic[P]):
+class RateLimited(Generic[P]):
     """A host behind serial lines: its clients are reached, and reach it, at the lines' pace.
 
     Args:

@@ -21,7 +21,7 @@ from dobot_async.transports.keep_alive import PeerWatch, keep_alive
 
 TLS_WITHIN = 5.0  # seconds
 
-__all__ = ["Connection", "Datagrams", "Host", "Peer", "on_tcp", "on_udp", "url_of"]
+__all__ = ["ClientConnection", "DatagramEndpoint", "Host", "Peer", "on_tcp", "on_udp", "url_of"]
 
 
 class Peer(Protocol):
@@ -73,8 +73,8 @@ async def on_tcp(
 ) -> str:
     """A TCP port, as a serial server has it; returns its URL, with the scheme that the host makes of it."""
     loop = asyncio.get_running_loop()
-    place = Port(host, tls, scheme)
-    server = await loop.create_server(lambda: Connection(place), address, port)
+    place = ListeningPort(host, tls, scheme)
+    server = await loop.create_server(lambda: ClientConnection(place), address, port)
     stack.push_async_callback(server.wait_closed)
     stack.push_async_callback(place.aclose)
     stack.callback(server.close)
@@ -82,7 +82,7 @@ async def on_tcp(
 
 
 @dataclass(eq=False, slots=True)
-class Port(Generic[P]):
+class ListeningPort(Generic[P]):
     """What the connections of one TCP port share.
 
     Attributes:
@@ -115,10 +115,10 @@ async def on_udp(
     admit: Callable[[bytes, bool], bytes | None] = lambda data, _known: data,
     crowded: Callable[[str], None] | None = None,
 ) -> str:
-    """A UDP port, as the arm's Wi-Fi has it; returns its URL. See `Datagrams`."""
+    """A UDP port, as the arm's Wi-Fi has it; returns its URL. See `DatagramEndpoint`."""
     loop = asyncio.get_running_loop()
     transport, _ = await loop.create_datagram_endpoint(
-        lambda: Datagrams(host, admit=admit, crowded=crowded), local_addr=(address, port)
+        lambda: DatagramEndpoint(host, admit=admit, crowded=crowded), local_addr=(address, port)
     )
     stack.callback(transport.close)
     return url_of("udp", transport.get_extra_info("sockname"))
@@ -130,7 +130,7 @@ def url_of(scheme: str, name: tuple[Any, ...]) -> str:
     return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
 
 
-class Connection(asyncio.Protocol, Generic[P]):
+class ClientConnection(asyncio.Protocol, Generic[P]):
     """One TCP client.
 
     The host hears of it before TLS is agreed upon, so that who never does it counts as well.
@@ -139,7 +139,7 @@ class Connection(asyncio.Protocol, Generic[P]):
         port: Where it has connected.
     """
 
-    def __init__(self, port: Port[P]) -> None:
+    def __init__(self, port: ListeningPort[P]) -> None:
         self._loop = asyncio.get_running_loop()
         self._port = port
         self._handshake: Handshake | None = None
@@ -235,7 +235,7 @@ class Connection(asyncio.Protocol, Generic[P]):
             self._transport.resume_reading()
 
 
-class Datagrams(asyncio.DatagramProtocol, Generic[P]):
+class DatagramEndpoint(asyncio.DatagramProtocol, Generic[P]):
     """All UDP clients, each known by its address; a handful at a time.
 
     Args:

@@ -13,10 +13,10 @@ from itertools import combinations
 from typing import Any
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async.fleet.claims import Claim, Party
+from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
 from dobot_async.fleet.errors import ZoneDeadlock
 from dobot_async.fleet.guard import Guard
-from dobot_async.fleet.seat import Seat
+from dobot_async.fleet.seat import FleetArm
 from dobot_async.fleet.work import side_by_side
 from dobot_async.fleet.zones import Zones, here
 
@@ -24,7 +24,7 @@ __all__ = ["admit_together", "turns"]
 
 
 @asynccontextmanager
-async def turns(seats: Mapping[str, Seat]) -> AsyncGenerator[None]:
+async def turns(seats: Mapping[str, FleetArm]) -> AsyncGenerator[None]:
     """While this is entered, nobody else commands these arms. They are taken in one order, by whomever."""
     async with AsyncExitStack() as stack:
         for name in sorted(seats):
@@ -36,7 +36,7 @@ async def turns(seats: Mapping[str, Seat]) -> AsyncGenerator[None]:
 
 
 async def admit_together(
-    seats: Mapping[str, Seat], motions: Mapping[str, Sequence[Motion]], zones: Zones, timeout: float | None
+    seats: Mapping[str, FleetArm], motions: Mapping[str, Sequence[Motion]], zones: Zones, timeout: float | None
 ) -> None:
     """Returns when arms whose turn it is may do all of this at once, and takes note of it.
 
@@ -62,7 +62,7 @@ async def admit_together(
     for name, seat in seats.items():
         claim = None
         if needed.get(name):
-            claim = Claim(seat.party, frozenset([seat.party]), needed[name])
+            claim = ZoneRequest(seat.party, frozenset([seat.party]), needed[name])
             zones.claims.take(claim)
 
         seat.enter(courses[name], claim)
@@ -72,12 +72,12 @@ async def admit_together(
 
 
 async def claim_for_all(
-    seats: Mapping[str, Seat],
+    seats: Mapping[str, FleetArm],
     guards: Mapping[str, Guard[Any]],
     needed: Mapping[str, frozenset[str]],
     zones: Zones,
     deadline: float | None,
-) -> Claim | None:
+) -> ZoneRequest | None:
     """Waits for all zones at once; returns the claim, None if there are none."""
     program = here()
     for name in seats:
@@ -88,8 +88,8 @@ async def claim_for_all(
         return None
 
     arms = frozenset(seats[name].party for name in guards)
-    claim = Claim(
-        Party(f"the start of {' and '.join(seats)} together"),
+    claim = ZoneRequest(
+        ZoneHolder(f"the start of {' and '.join(seats)} together"),
         frozenset(each.party for each in program.line()) | arms,
         everything,
         patient=all(guard.patient for guard in guards.values()),

@@ -9,9 +9,9 @@ from functools import partial
 
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async.errors import ReplyTimeout
-from dobot_async.fleet.claims import Claims, Party, Pause
+from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks
 from dobot_async.fleet.errors import BarrierBroken, ZoneDeadlock
-from dobot_async.fleet.zones import Program
+from dobot_async.fleet.zones import FleetProgram
 
 __all__ = ["Barriers"]
 
@@ -27,10 +27,12 @@ class Gathering:
     """
 
     parties: frozenset[str]
-    waiting: dict[asyncio.Future[str], Party | None] = field(default_factory=dict[asyncio.Future[str], Party | None])
+    waiting: dict[asyncio.Future[str], ZoneHolder | None] = field(
+        default_factory=dict[asyncio.Future[str], ZoneHolder | None]
+    )
     broken: str = ""
 
-    def absent(self, run: Mapping[str, Party], arrived: asyncio.Future[str]) -> list[Party]:
+    def absent(self, run: Mapping[str, ZoneHolder], arrived: asyncio.Future[str]) -> list[ZoneHolder]:
         """Who of a run keeps one who has come from going on."""
         if arrived.done():
             return []
@@ -58,7 +60,7 @@ class Barriers:
         claims: Where it is found out who would wait for himself.
     """
 
-    def __init__(self, claims: Claims) -> None:
+    def __init__(self, claims: ZoneLocks) -> None:
         self._claims = claims
         self._gatherings: dict[tuple[int, str], Gathering] = {}
         self._gone: dict[tuple[int, str], str] = {}
@@ -67,8 +69,8 @@ class Barriers:
         self,
         name: str,
         parties: Collection[str],
-        program: Program,
-        arms: frozenset[Party],
+        program: FleetProgram,
+        arms: frozenset[ZoneHolder],
         timeout: float | None,
         epoch: Epoch,
     ) -> None:
@@ -105,7 +107,7 @@ class Barriers:
         arrived: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         gathering.waiting[arrived] = part.party if part else None
         absent = partial(gathering.absent, run.parties if run else {}, arrived)
-        pause = Pause(f"at barrier {name!r} for", program.party, arms | {program.party}, absent)
+        pause = ProgramWait(f"at barrier {name!r} for", program.party, arms | {program.party}, absent)
         try:
             if len(gathering.waiting) == len(gathering.parties):
                 gathering.open()

@@ -147,18 +147,19 @@ def connect_options(family: str, kind: type[Any], table: Mapping[str, Any]) -> d
 
 def option(name: str, default: object, value: Any) -> Any:
     """The value of an option, of the kind that its default is of; raises ValueError for others."""
-    kinds = kinds_of(default)
+    kinds, found = kinds_of(default), value
     if isinstance(value, bool):
         right = bool in kinds
     elif isinstance(value, list):
-        return span({name: value}, name) if tuple in kinds else wrong_kind(name, value)
+        right = tuple in kinds
+        found = span({name: value}, name) if right else None
     elif isinstance(value, int | float):
         right = float in kinds
         number({name: value}, name)
     else:
         right = isinstance(value, kinds)
 
-    return value if right else wrong_kind(name, value)
+    return found if right else wrong_kind(name, cast(object, value))
 
 
 def kinds_of(default: object) -> tuple[type[Any], ...]:

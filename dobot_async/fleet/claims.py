@@ -24,11 +24,11 @@ from itertools import chain
 from dobot_async.errors import DobotError
 from dobot_async.fleet.errors import ZoneDeadlock, ZoneOccupied
 
-__all__ = ["Claim", "Claims", "Party", "Pause"]
+__all__ = ["ProgramWait", "ZoneHolder", "ZoneLocks", "ZoneRequest"]
 
 
 @dataclass(eq=False, slots=True)
-class Party:
+class ZoneHolder:
     """Somebody who can hold a zone: an arm, or a program.
 
     Attributes:
@@ -45,7 +45,7 @@ class Party:
 
 
 @dataclass(eq=False, slots=True)
-class Claim:
+class ZoneRequest:
     """A wish for zones, and the hold on them once it is granted.
 
     Attributes:
@@ -60,15 +60,15 @@ class Claim:
         parked: Tells of an arm that stands whether nobody is left who would move it.
     """
 
-    party: Party
-    own: frozenset[Party]
+    party: ZoneHolder
+    own: frozenset[ZoneHolder]
     zones: frozenset[str]
     answer: Callable[[DobotError | None], None] = field(default=lambda _: None)
     patient: bool = True
-    stuck: frozenset[Party] = frozenset()
-    asker: Party | None = None
-    movers: frozenset[Party] = frozenset()
-    parked: Callable[[Party], bool] = field(default=lambda _: False)
+    stuck: frozenset[ZoneHolder] = frozenset()
+    asker: ZoneHolder | None = None
+    movers: frozenset[ZoneHolder] = frozenset()
+    parked: Callable[[ZoneHolder], bool] = field(default=lambda _: False)
 
     def __post_init__(self) -> None:
         self.stuck |= self.own
@@ -77,7 +77,7 @@ class Claim:
 
 
 @dataclass(eq=False, slots=True)
-class Pause:
+class ProgramWait:
     """A program's wait for others to do something: to come to a barrier, or to let it command an arm.
 
     Attributes:
@@ -88,41 +88,41 @@ class Pause:
     """
 
     what: str
-    asker: Party
-    stuck: frozenset[Party]
-    awaited: Callable[[], Collection[Party]]
+    asker: ZoneHolder
+    stuck: frozenset[ZoneHolder]
+    awaited: Callable[[], Collection[ZoneHolder]]
 
 
-Wait = Claim | Pause
+Wait = ZoneRequest | ProgramWait
 Obstacle = tuple[Callable[[Wait], bool], str]
 """What keeps a wait from ending: whether another wait has to end before, and the words for it."""
 
 
-class Claims:
+class ZoneLocks:
     """All claims of one cell."""
 
     def __init__(self) -> None:
-        self._held: list[Claim] = []
-        self._waiting: list[Claim] = []
-        self._prepared: list[Claim] = []
-        self._pauses: list[Pause] = []
+        self._held: list[ZoneRequest] = []
+        self._waiting: list[ZoneRequest] = []
+        self._prepared: list[ZoneRequest] = []
+        self._pauses: list[ProgramWait] = []
 
     @property
-    def held(self) -> list[Claim]:
+    def held(self) -> list[ZoneRequest]:
         """The claims that are granted, oldest first."""
         return list(self._held)
 
     @property
-    def waiting(self) -> list[Claim]:
+    def waiting(self) -> list[ZoneRequest]:
         """The claims that wait, oldest first."""
         return list(self._waiting)
 
-    def holders(self, zone: str) -> list[Party]:
+    def holders(self, zone: str) -> list[ZoneHolder]:
         """Returns who holds a zone."""
         return list(dict.fromkeys(claim.party for claim in self._held if zone in claim.zones))
 
     @contextmanager
-    def preparing(self, claim: Claim) -> Generator[None]:
+    def preparing(self, claim: ZoneRequest) -> Generator[None]:
         """While this is entered, a claim is not judged yet, but ended as one that waits."""
         self._prepared.append(claim)
         try:
@@ -130,7 +130,7 @@ class Claims:
         finally:
             self._prepared.remove(claim)
 
-    def request(self, claim: Claim) -> None:
+    def request(self, claim: ZoneRequest) -> None:
         """Enters a claim; it may be answered before this returns."""
         self._waiting.append(claim)
         self.settle()
@@ -139,7 +139,7 @@ class Claims:
             claim.answer(ZoneOccupied(f"{claim.party.name} may not pass: {self._reason(claim)}"))
 
     @contextmanager
-    def pausing(self, pause: Pause) -> Generator[None]:
+    def pausing(self, pause: ProgramWait) -> Generator[None]:
         """While this is entered, a program waits for others; raises ZoneDeadlock if it would do so for ever."""
         cycle = self._cycle(pause)
         if cycle:
@@ -152,12 +152,12 @@ class Claims:
         finally:
             self._pauses.remove(pause)
 
-    def take(self, claim: Claim) -> None:
+    def take(self, claim: ZoneRequest) -> None:
         """Grants a claim to who is in the zones already, whoever else holds them."""
         self._held.append(claim)
         self.settle()
 
-    def release(self, claim: Claim) -> None:
+    def release(self, claim: ZoneRequest) -> None:
         """Gives back all zones of a claim, which is withdrawn if it waits."""
         if claim in self._waiting:
             self._waiting.remove(claim)
@@ -165,7 +165,7 @@ class Claims:
         else:
             self.keep([claim], frozenset())
 
-    def keep(self, claims: Collection[Claim], zones: frozenset[str]) -> None:
+    def keep(self, claims: Collection[ZoneRequest], zones: frozenset[str]) -> None:
         """Gives back all that several claims hold but some zones. What is not held does not matter."""
         for claim in [claim for claim in claims if claim in self._held]:
             claim.zones &= zones
@@ -174,11 +174,11 @@ class Claims:
 
         self.settle()
 
-    def fail(self, parties: Collection[Party], error: DobotError) -> None:
+    def fail(self, parties: Collection[ZoneHolder], error: DobotError) -> None:
         """Ends the waiting of all that act for one of these parties."""
         self._end(lambda claim: not claim.stuck.isdisjoint(parties), error)
 
-    def interrupt(self, party: Party, error: DobotError) -> None:
+    def interrupt(self, party: ZoneHolder, error: DobotError) -> None:
         """Ends the waiting for what one party is to move by; not that of programs which act for it."""
         self._end(lambda claim: party in claim.movers, error)
 
@@ -204,7 +204,7 @@ class Claims:
             self._waiting.remove(claim)
             claim.answer(error)
 
-    def _end(self, concerned: Callable[[Claim], bool], error: DobotError) -> None:
+    def _end(self, concerned: Callable[[ZoneRequest], bool], error: DobotError) -> None:
         """Ends the waiting of some claims."""
         for claim in filter(concerned, (*self._waiting, *self._prepared)):
             if claim in self._waiting:
@@ -214,7 +214,7 @@ class Claims:
 
         self.settle()
 
-    def _foreign(self, claim: Claim) -> Iterator[tuple[Party, str]]:
+    def _foreign(self, claim: ZoneRequest) -> Iterator[tuple[ZoneHolder, str]]:
         """Who stands in the way of a claim, and in which zone; who is in a zone may move in it, even beside others.
 
         To hold it is not enough: who only may be in a zone, beside another one who only may be there, could meet it.
@@ -224,26 +224,26 @@ class Claims:
                 for zone in sorted(each.zones & claim.zones - claim.party.inside):
                     yield each.party, zone
 
-    def _free(self, claim: Claim) -> bool:
+    def _free(self, claim: ZoneRequest) -> bool:
         return next(self._foreign(claim), None) is None
 
-    def _next(self, claim: Claim) -> bool:
+    def _next(self, claim: ZoneRequest) -> bool:
         """Whether no earlier claim has a better right."""
         return all(claim in self._behind(earlier) for earlier in self._before(claim))
 
-    def _before(self, claim: Claim) -> list[Claim]:
+    def _before(self, claim: ZoneRequest) -> list[ZoneRequest]:
         """The earlier claims on the same zones that still wait."""
         earlier = self._waiting[: self._waiting.index(claim)]
         return [each for each in earlier if not each.zones.isdisjoint(claim.zones)]
 
-    def _behind(self, claim: Claim) -> set[Wait]:
+    def _behind(self, claim: ZoneRequest) -> set[Wait]:
         """All that a claim waits for, directly or not."""
         found: set[Wait] = set()
         todo: list[Wait] = [claim]
         while todo:
             each = todo.pop()
             ends_before = [self._held_up(obstacle) for obstacle, _ in self._obstacles(each)]
-            earlier = self._before(each) if isinstance(each, Claim) else []
+            earlier = self._before(each) if isinstance(each, ZoneRequest) else []
             for other in (*chain.from_iterable(ends_before), *earlier):
                 if other not in found:
                     found.add(other)
@@ -253,7 +253,7 @@ class Claims:
 
     def _obstacles(self, wait: Wait) -> Iterator[Obstacle]:
         """What keeps a wait from ending."""
-        if isinstance(wait, Pause):
+        if isinstance(wait, ProgramWait):
             for party in wait.awaited():
                 yield partial(keeps_away, party), f"{wait.what} {party.name}"
         else:
@@ -265,7 +265,7 @@ class Claims:
         waits: list[Wait] = [*self._waiting, *self._pauses]
         return [wait for wait in waits if obstacle(wait)]
 
-    def _hopeless(self) -> Iterator[tuple[Claim, DobotError]]:
+    def _hopeless(self) -> Iterator[tuple[ZoneRequest, DobotError]]:
         """Claims that wait for somebody who has failed, for an arm that nobody moves any more, or for themselves."""
         for claim in reversed(self._waiting):
             for party, zone in self._foreign(claim):
@@ -285,7 +285,7 @@ class Claims:
         seen: set[Wait] = set()
         while ways:
             each, words = ways.pop(0)
-            who = each.party if isinstance(each, Claim) else each.asker
+            who = each.party if isinstance(each, ZoneRequest) else each.asker
             for obstacle, why in self._obstacles(each):
                 told = [*words, f"{who.name} waits {why}"]
                 if obstacle(start):
@@ -298,18 +298,18 @@ class Claims:
 
         return []
 
-    def _reason(self, claim: Claim) -> str:
+    def _reason(self, claim: ZoneRequest) -> str:
         """Why a claim has to wait, in words."""
         held = [f"{party.name} holds zone {zone}" for party, zone in self._foreign(claim)]
         return "; ".join(held) or f"others wait for {', '.join(sorted(claim.zones))}"
 
 
-def keeps_in(party: Party, wait: Wait) -> bool:
+def keeps_in(party: ZoneHolder, wait: Wait) -> bool:
     """Whether a party that holds a zone leaves it only when a wait has ended."""
     return party in wait.stuck and not party.moving()
 
 
-def keeps_away(party: Party, wait: Wait) -> bool:
+def keeps_away(party: ZoneHolder, wait: Wait) -> bool:
     """Whether a party does what is awaited of it only when a wait has ended."""
     return party is wait.asker
 

@@ -16,19 +16,19 @@ from dobot_async._core.util.shapes import Shape
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.barriers import Barriers
-from dobot_async.fleet.claims import Party
-from dobot_async.fleet.seat import Member, Seat, tell_to_stop
+from dobot_async.fleet.claims import ZoneHolder
+from dobot_async.fleet.seat import FleetArm, Member, tell_to_stop
 from dobot_async.fleet.work import ended, named, on_the_way_out
 from dobot_async.fleet.zones import Zones
 from dobot_async.traces.recorder import shared
 
-__all__ = ["Crew", "OnFailure"]
+__all__ = ["FleetBase", "OnFailure"]
 
 A = TypeVar("A")
 OnFailure = Literal["fleet", "group", "alone"]
 
 
-class Crew(Generic[A]):
+class FleetBase(Generic[A]):
     """The part of `Fleet` that is not for its users.
 
     Attributes:
@@ -43,12 +43,12 @@ class Crew(Generic[A]):
     ) -> None:
         self.failures: dict[str, DobotError] = {}
         self._groups = groups
-        self._zones = Zones(dict(zones), {name: Party(name) for name in members})
+        self._zones = Zones(dict(zones), {name: ZoneHolder(name) for name in members})
         self._barriers = Barriers(self._zones.claims)
         self._seats = {
-            name: Seat(name, member, self._zones, self._fail, self._works) for name, member in members.items()
+            name: FleetArm(name, member, self._zones, self._fail, self._works) for name, member in members.items()
         }
-        self._stopping: dict[asyncio.Task[None], Seat] = {}
+        self._stopping: dict[asyncio.Task[None], FleetArm] = {}
         self._leaving = False
         self._epoch = Epoch()
 
@@ -93,14 +93,14 @@ class Crew(Generic[A]):
         for task in hosts:
             task.result()
 
-    def _seat(self, name: str) -> Seat:
+    def _seat(self, name: str) -> FleetArm:
         """The place of an arm."""
         if name not in self._seats:
             raise KeyError(f"no arm {name!r} in this fleet; there are: {', '.join(self._seats)}")
 
         return self._seats[name]
 
-    def _affected(self, name: str) -> Collection[Seat]:
+    def _affected(self, name: str) -> Collection[FleetArm]:
         """The arms that stop when one fails, itself among them unless it fails alone."""
         group = self._seats[name].member.group
         reach = self._groups[group] if group else "fleet"
@@ -118,7 +118,7 @@ class Crew(Generic[A]):
         """The arms through whose failures others were stopped."""
         return self.failures if isinstance(error, MotionStopped) else ()
 
-    def _fail(self, failed: Seat, error: DobotError) -> None:
+    def _fail(self, failed: FleetArm, error: DobotError) -> None:
         """An arm has failed: the others stop, and nobody waits for it any more."""
         if self._leaving:
             return
@@ -145,7 +145,7 @@ class Crew(Generic[A]):
 
             self._zones.claims.fail([seat.party], seat.stopped)
 
-    def _works(self, seat: Seat) -> None:
+    def _works(self, seat: FleetArm) -> None:
         """An arm may move, whatever it has failed with before."""
         if seat.party.failure:
             seat.party.failure = None
@@ -169,7 +169,7 @@ class Crew(Generic[A]):
         return [problem for problem in heard if problem]
 
 
-async def host(seat: Seat, options: Mapping[str, Any], ready: asyncio.Future[None], leave: asyncio.Event) -> None:
+async def host(seat: FleetArm, options: Mapping[str, Any], ready: asyncio.Future[None], leave: asyncio.Event) -> None:
     """Holds one arm's connection until all are to be left; cancelled, it leaves it as by an error."""
     member = seat.member
     try:

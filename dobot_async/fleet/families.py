@@ -36,7 +36,7 @@ from dobot_async.fleet.magician_planner import MagicianPlanner
 from dobot_async.fleet.planner import Planner, Unplanned
 from dobot_async.fleet.queue import FleetQueue
 
-__all__ = ["FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "AnyArm", "Family", "family_of"]
+__all__ = ["FAMILIES", "MAGICIAN", "MYCOBOT", "ULTRAARM", "AnyArm", "FleetFamily", "family_of"]
 
 AnyArm = Magician | MyCobot | UltraArm
 LOOK = 0.1  # seconds between two looks at an arm that still does what was left in its queue
@@ -150,7 +150,7 @@ class FleetUltraArm(UltraArm):
 
 
 @dataclass(frozen=True, slots=True)
-class Family:
+class FleetFamily:
     """What the fleet has to know of a family.
 
     Attributes:
@@ -213,7 +213,7 @@ async def ultraarm_leftovers(arm: FleetUltraArm) -> None:
         await asyncio.sleep(LOOK)
 
 
-MAGICIAN = Family(
+MAGICIAN = FleetFamily(
     arm=Magician,
     name="magician",
     kind=FleetMagician,
@@ -225,7 +225,7 @@ MAGICIAN = Family(
     stop=magician.SET_QUEUED_CMD_FORCE_STOP_EXEC,
 )
 
-MYCOBOT = Family(
+MYCOBOT = FleetFamily(
     arm=MyCobot,
     name="mycobot",
     kind=FleetMyCobot,
@@ -235,7 +235,7 @@ MYCOBOT = Family(
     ask=mycobot.IS_POWER_ON,
 )
 
-ULTRAARM = Family(
+ULTRAARM = FleetFamily(
     arm=UltraArm,
     name="ultraarm",
     kind=FleetUltraArm,
@@ -246,11 +246,11 @@ ULTRAARM = Family(
     pauses=False,
 )
 
-FAMILIES: Each[Family] = Each("fleet")
+FAMILIES: Each[FleetFamily] = Each("fleet")
 """All of them."""
 
 
-def family_of(kind: type[Any]) -> Family:
+def family_of(kind: type[Any]) -> FleetFamily:
     """Returns what a fleet knows of a class of arms; raises ValueError for another class."""
     found = next((family for family in FAMILIES if family.arm is kind), None)
     if found is None:

@@ -12,10 +12,10 @@ Coordinates are each arm's own; its base frame turns those of the cell into them
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Iterator, Mapping
+from collections.abc import AsyncGenerator, Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, TypeVar, cast, overload
+from typing import Any, TypeVar, cast, overload
 
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async._core.util.shapes import Shape
@@ -26,26 +26,24 @@ from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.mycobot.queue import CobotBatch
 from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.arms.ultraarm.queue import UltraArmBatch
-from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
+from dobot_async.errors import MotionStopped, ReplyTimeout
 from dobot_async.fleet.cell import read_cell
-from dobot_async.fleet.claims import Party
-from dobot_async.fleet.crew import Crew, OnFailure
+from dobot_async.fleet.crew import OnFailure
 from dobot_async.fleet.families import AnyArm
 from dobot_async.fleet.frames import BaseFrame, Place
-from dobot_async.fleet.seat import Member, Seat, tell_to_stop
+from dobot_async.fleet.programs import Programs
+from dobot_async.fleet.seat import Member, tell_to_stop
 from dobot_async.fleet.together import Launch, Together, abandon
-from dobot_async.fleet.work import all_of, named, side_by_side
-from dobot_async.fleet.zones import Program, Run, here, running
+from dobot_async.fleet.work import all_of
+from dobot_async.fleet.zones import here
 
 __all__ = ["Fleet", "OnFailure"]
 
 A = TypeVar("A")
 K = TypeVar("K")
-T = TypeVar("T")
-P = ParamSpec("P")
 
 
-class Fleet(Crew[A]):
+class Fleet(Programs[A]):
     """Connected arms by name; made by `connect` or `from_file`, for the length of a block.
 
     Attributes:
@@ -95,10 +93,7 @@ class Fleet(Crew[A]):
             ValueError: A URL or an argument is wrong.
             ConnectFailed: An arm did not answer; the message names it.
         """
-        members = {
-            name: arm if isinstance(arm, Member) else Member(arm, cast("type[Any]", Magician))
-            for name, arm in arms.items()
-        }
+        members = {name: as_member(arm) for name, arm in arms.items()}
         groups = groups or {}
         if not members:
             raise ValueError("a fleet has at least one arm")
@@ -109,7 +104,7 @@ class Fleet(Crew[A]):
                 f'each group is in groups, with "fleet", "group" or "alone"; not so: {sorted(unknown) or dict(groups)}'
             )
 
-        fleet = cls(cast(Any, members), zones or {}, groups)
+        fleet = cls(members, zones or {}, groups)
         return fleet._connected(options)
 
     @classmethod
@@ -169,43 +164,6 @@ class Fleet(Crew[A]):
         """Returns what a place of the cell is for an arm."""
         return self.base(name).to_arm(x, y, z, r)
 
-    @overload
-    async def each(self, verb: str, *args: Any, **kwargs: Any) -> dict[str, Any]: ...
-
-    @overload
-    async def each(
-        self, verb: Callable[Concatenate[A, P], Awaitable[T]], *args: P.args, **kwargs: P.kwargs
-    ) -> dict[str, T]: ...
-
-    async def each(self, verb: Any, *args: Any, **kwargs: Any) -> dict[str, Any]:
-        """Does the same with all arms at the same time, and returns what each has returned.
-
-        Args:
-            verb: The name of a method, or something to call with each arm, such as `Magician.home`.
-            *args: What it takes.
-            **kwargs: What it takes.
-
-        Raises:
-            DobotError: The first failure, with the arm's name; what the others did was cancelled, so that they stop,
-                unless their group goes on.
-        """
-        parent, epoch = here(), self._epoch
-
-        async def done(seat: Seat) -> Any:
-            method = getattr(seat.arm, verb) if isinstance(verb, str) else None
-            part = Program(Party(f"each {seat.name}"), asyncio.current_task(), parent, epoch=epoch)
-            try:
-                with running(part):
-                    part.check()
-                    return await (method(*args, **kwargs) if method else verb(seat.arm, *args, **kwargs))
-            except (DobotError, ValueError) as error:
-                named(seat.name, error)
-                raise
-
-        async with self._stopping_others():
-            work = {name: done(seat) for name, seat in self._seats.items()}
-            return await side_by_side(work, ends=self._ends, causes=self._causes)
-
     async def stop(self, *, timeout: float = STAYING) -> None:
         """Stops all arms, at the same time; pending Motions raise MotionStopped.
 
@@ -251,91 +209,6 @@ class Fleet(Crew[A]):
             if seat.stopped is reasons[name]:  # else another failure has stopped it meanwhile
                 seat.stopped = None
                 self._works(seat)
-
-    async def run(self, programs: Mapping[str, Coroutine[Any, Any, T]]) -> dict[str, T]:
-        """Runs programs side by side, and returns what each has returned.
-
-        Args:
-            programs: Coroutines, by the name of the arm that each commands, or by another name.
-
-        Raises:
-            BaseException: The first failure, when all have ended; the others were cancelled, unless the group of the
-                arm that failed lets them go on.
-        """
-        parent, epoch = here(), self._epoch
-        run = Run({name: Party(f"program {name}") for name in programs}, set(programs))
-
-        async def ran(name: str, program: Coroutine[Any, Any, T]) -> T:
-            arm = name if name in self._seats else None
-            part = Program(run.parties[name], asyncio.current_task(), parent, arm, run, epoch)
-            if arm:
-                self._zones.drive(arm, part)
-
-            why = "has ended"
-            try:
-                with running(part):
-                    return await program
-            except BaseException as error:
-                why = f"has failed: {error or type(error).__name__}"
-                if arm and isinstance(error, ValueError):
-                    named(name, error)
-
-                raise
-            finally:
-                self._barriers.leave(name, f"{name} {why}", run=run)
-                self._zones.leave(part, name)
-
-        async with self._stopping_others():
-            try:
-                work = {name: ran(name, each) for name, each in programs.items()}
-                return await side_by_side(work, ends=self._ends, causes=self._causes)
-            finally:
-                self._barriers.forget(run)
-
-    async def barrier(self, name: str, *parties: str, timeout: float | None = None) -> None:
-        """Returns when all parties have come to this barrier; it may be passed any number of times.
-
-        Args:
-            name: Of the barrier.
-            parties: Who has to come; by default all programs of the same `run`, outside of one all arms of the fleet.
-            timeout: Seconds to wait.
-
-        Raises:
-            BarrierBroken: One of them failed, ended or gave up; it stays broken for the run, or until `recover`.
-            ZoneDeadlock: Among programs of a `run`: one of them waits, in the end, for a zone that this one holds.
-            ReplyTimeout: They did not all come in time.
-            MotionStopped: The fleet was stopped meanwhile.
-        """
-        program = here()
-        part = program.part()
-        names = parties or (part.run.parties if part and part.run else self._seats)
-        arms = self._zones.driven(program)
-        await self._barriers.wait(name, frozenset(names), program, arms, timeout, self._epoch)
-
-    def zone(self, name: str, *arms: str, timeout: float | None = None) -> AbstractAsyncContextManager[None]:
-        """Holds a zone for the length of a block; nobody else does.
-
-        Args:
-            name: Of the zone.
-            arms: Whose being in the zone is no hindrance. The arm of a program of `run`, and those that this task has
-                moved, need not be named.
-            timeout: Seconds to wait for it.
-
-        Raises:
-            ValueError: There is no such zone.
-            ZoneDeadlock: Its holder waits, in the end, for who asks.
-            ZoneOccupied: An arm that has failed may be in it; or, in a `run`, one is that no program moves any more.
-            ReplyTimeout: It was not free in time.
-            MotionStopped: The fleet was stopped while this waited.
-        """
-        for arm in arms:
-            self._seat(arm)
-
-        return self._zones.hold(name, arms, timeout, self._epoch)
-
-    def holders(self, zone: str) -> list[str]:
-        """Returns the names of those who hold a zone."""
-        return [party.name for party in self._zones.claims.holders(zone)]
 
     @overload
     def together(
@@ -387,6 +260,11 @@ class Fleet(Crew[A]):
             except BaseException:
                 abandon(batches)
                 raise
+
+
+def as_member(arm: str | Member[Any]) -> Member[Any]:
+    """What a fleet is told of an arm; a URL is that of a Magician."""
+    return arm if isinstance(arm, Member) else Member(arm, Magician)
 
 
 async def stopped(stop: asyncio.Task[None], timeout: float) -> None:

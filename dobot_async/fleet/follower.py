@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from dobot_async.errors import DobotError
-from dobot_async.fleet.course import Step
+from dobot_async.fleet.course import PlannedStep
 from dobot_async.fleet.guard import Guard
 
 __all__ = ["Follower"]
@@ -30,7 +30,7 @@ class Follower:
         quiet: Whether motions are not to be watched for now: those that were not sent yet cannot be.
     """
 
-    def __init__(self, steps: deque[Step], spawn: Spawn) -> None:
+    def __init__(self, steps: deque[PlannedStep], spawn: Spawn) -> None:
         self.guard: Guard[Any] | None = None
         self.quiet = False
         self._steps = steps

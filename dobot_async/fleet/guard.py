@@ -18,10 +18,10 @@ from contextlib import asynccontextmanager
 from typing import Literal, TypeVar
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async.fleet.claims import Claim, Party
-from dobot_async.fleet.course import Course, Step
+from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
+from dobot_async.fleet.course import PlannedCourse, PlannedStep, shifted
 from dobot_async.fleet.frames import BaseFrame
-from dobot_async.fleet.limits import Limits
+from dobot_async.fleet.limits import FleetLimits
 from dobot_async.fleet.planner import Planner, Stance
 from dobot_async.fleet.whereabouts import Stops, Whereabouts
 from dobot_async.fleet.zones import Zones, here
@@ -49,22 +49,22 @@ class Guard(Whereabouts[S]):
 
     def __init__(
         self,
-        steps: deque[Step],
+        steps: deque[PlannedStep],
         planner: Planner[S],
         queue: Stops,
         zones: Zones,
-        party: Party,
+        party: ZoneHolder,
         *,
         base: BaseFrame,
         mode: Mode,
         clearance: float,
-        limits: Limits,
+        limits: FleetLimits,
     ) -> None:
         super().__init__(steps, planner, queue, zones, party, base=base, clearance=clearance)
         self.patient = mode == "wait"
         self._limits = limits
 
-    async def plan(self, motions: Sequence[Motion]) -> Course[S]:
+    async def plan(self, motions: Sequence[Motion]) -> PlannedCourse[S]:
         """Look at commands that are to be sent together; nothing is held yet.
 
         Raises:
@@ -76,12 +76,12 @@ class Guard(Whereabouts[S]):
             await self._be_sure()
 
         planner, ahead = self._planner, list(self._steps)
-        stance, steps, changes = self._stance, list[Step](), False
+        stance, steps, changes = self._stance, list[PlannedStep](), False
         for motion in motions:
             value = motion.entry.value
             plan = await planner.plan(value, stance) if motion.moves else planner.change(value, stance)
             if plan is None:
-                steps.append(Step(motion))
+                steps.append(PlannedStep(motion))
                 continue
 
             if motion.moves:
@@ -92,12 +92,16 @@ class Guard(Whereabouts[S]):
 
             changes = True
             after = None if plan.end is None else self._zones_of(plan.end.region)
-            steps.append(Step(motion, self._zones_of(plan.region), after))
+            zones, region = self._zones_of(plan.region), plan.region if motion.moves else None
+            steps.append(step := PlannedStep(motion, zones, after, region, plan.shift))
+            if plan.shift:
+                step.zones = zones.union(*(self._zones_of(*stopped) for stopped in shifted(ahead + steps)))
+
             stance = plan.end
 
-        return Course(steps, stance, changes)
+        return PlannedCourse(steps, stance, changes)
 
-    async def claim(self, zones: frozenset[str], deadline: float | None) -> Claim | None:
+    async def claim(self, zones: frozenset[str], deadline: float | None) -> ZoneRequest | None:
         """Wait for zones, or raise, as the mode says.
 
         Raises:
@@ -113,7 +117,7 @@ class Guard(Whereabouts[S]):
 
         # Only its own programs let it in: two arms that one program moves must not meet, either.
         own = frozenset(each.party for each in program.line()) | {self._party}
-        claim = Claim(
+        claim = ZoneRequest(
             self._party,
             own,
             zones,

@@ -15,7 +15,7 @@ from dobot_async.errors import DobotError
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.planner import XYZ
 
-__all__ = ["Limits"]
+__all__ = ["FleetLimits"]
 
 ROUNDING = 0.01  # mm; what numbers lose on the line
 LOOK = 0.02  # seconds between two looks at an arm that jogs
@@ -24,7 +24,7 @@ SILENT = 0.3  # seconds for which a jog goes on that cannot be seen
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class FleetLimits:
     """The limits of one arm.
 
     Attributes:

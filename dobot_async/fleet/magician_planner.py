@@ -201,7 +201,7 @@ class MagicianPlanner:
 
         end = replace(start, bias=bias, slack=0.0)
         places = [stance.kinematics.forward(*start.joints)[:3] for stance in (start, end)]
-        return Plan(start.along(places, start.rail), end, ())
+        return Plan(start.along(places, start.rail), end, (), math.dist(numbers(start.bias), numbers(bias)))
 
     def _goal(self, value: object, rail: Span | None) -> Sequence[XYZ] | None:
         """Where a way that is not known ends, if that is given; none for what limits do not concern."""

@@ -115,11 +115,13 @@ class Plan(NamedTuple, Generic[S]):
         end: Where the arm stands then; None if that is not known.
         outline: Places that limits have to contain for the way to be within them; None if not even its end is known,
             none for what limits do not concern.
+        shift: mm by which it puts the tool elsewhere, wherever the arm stands then.
     """
 
     region: Region
     end: S | None
     outline: Sequence[XYZ] | None
+    shift: float = 0.0
 
 
 class Planner(Protocol[S]):

@@ -15,32 +15,32 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.arms.base import Arm
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped
-from dobot_async.fleet.claims import Claim
-from dobot_async.fleet.course import Course, Step
-from dobot_async.fleet.families import Family, family_of
+from dobot_async.fleet.claims import ZoneRequest
+from dobot_async.fleet.course import PlannedCourse, PlannedStep
+from dobot_async.fleet.families import FleetFamily, family_of
 from dobot_async.fleet.follower import Follower
 from dobot_async.fleet.guard import Guard
-from dobot_async.fleet.limits import Limits
+from dobot_async.fleet.limits import FleetLimits
 from dobot_async.fleet.member import Member
 from dobot_async.fleet.queue import FleetQueue
 from dobot_async.fleet.turn import Turn
 from dobot_async.fleet.work import named
 from dobot_async.fleet.zones import Zones, here
 
-__all__ = ["Member", "Seat", "tell_to_stop"]
+__all__ = ["FleetArm", "Member", "tell_to_stop"]
 
 
-recovering: ContextVar[Seat | None] = ContextVar("recovering", default=None)
+recovering: ContextVar[FleetArm | None] = ContextVar("recovering", default=None)
 """The arm that is made ready again here: what that takes, such as power, passes though the arm is stopped."""
 
 
-def tell_to_stop(seats: Iterable[Seat]) -> None:
+def tell_to_stop(seats: Iterable[FleetArm]) -> None:
     """Tells arms to stop before this returns, as far as their links can; `begin_stop` of each is to follow."""
     for seat in seats:
         seat.tell_to_stop()
 
 
-class Seat:
+class FleetArm:
     """The place of one arm in its fleet; the `Overseer` of its queue.
 
     Attributes:
@@ -59,12 +59,12 @@ class Seat:
         name: str,
         member: Member[Any],
         zones: Zones,
-        failed: Callable[[Seat, DobotError], None],
-        works: Callable[[Seat], None],
+        failed: Callable[[FleetArm, DobotError], None],
+        works: Callable[[FleetArm], None],
     ) -> None:
         self.name = name
         self.member = member
-        self.family: Family = family_of(member.kind)
+        self.family: FleetFamily = family_of(member.kind)
         self.party = zones.arms[name]
         self.guard: Guard[Any] | None = None
         self.stopped: DobotError | None = None
@@ -73,7 +73,7 @@ class Seat:
         self._zones = zones
         self._failed = failed
         self._works = works
-        self._steps: deque[Step] = deque()
+        self._steps: deque[PlannedStep] = deque()
         self._turns = Turn(name, zones)
         self._halting: Any = None  # the frame that stops the arm, ready to be sent
         self._tasks: set[asyncio.Task[None]] = set()
@@ -93,7 +93,7 @@ class Seat:
     @property
     def queue(self) -> FleetQueue:
         """The arm's queue."""
-        return cast(FleetQueue, self.arm.queue)  # each class of `Family.kind` has one
+        return cast(FleetQueue, self.arm.queue)  # each class of `FleetFamily.kind` has one
 
     async def begin(self, arm: Arm, options: Mapping[str, Any]) -> None:
         """Takes an arm that was just connected, with these options."""
@@ -114,7 +114,7 @@ class Seat:
                 base=member.base,
                 mode=member.guard,
                 clearance=member.clearance,
-                limits=Limits(self.name, member.limits, member.base),
+                limits=FleetLimits(self.name, member.limits, member.base),
             )
             if options.get("queue") == "keep" and self.commands:
                 await guard.glimpse()
@@ -274,14 +274,14 @@ class Seat:
         self._turns.end()
         self._follower.follow()
 
-    async def plan(self, motions: Sequence[Motion]) -> Course[Any]:
+    async def plan(self, motions: Sequence[Motion]) -> PlannedCourse[Any]:
         """Looks at what is to be sent together; see `Guard.plan`."""
         if self.guard:
             return await self.guard.plan(motions)
 
-        return Course([Step(motion) for motion in motions], None, moves=False)
+        return PlannedCourse([PlannedStep(motion) for motion in motions], None, moves=False)
 
-    def enter(self, course: Course[Any], claim: Claim | None) -> None:
+    def enter(self, course: PlannedCourse[Any], claim: ZoneRequest | None) -> None:
         """Takes note of what is sent now, with the claim on its zones."""
         if self.guard:
             self.guard.enter(course, claim)

@@ -25,7 +25,7 @@ def known(table: Mapping[str, Any], names: Collection[str], what: str) -> None:
 
 def tables(value: Any, name: str) -> Mapping[str, Mapping[str, Any]]:
     """A table of tables."""
-    found: dict[str, Any] = value if isinstance(value, dict) else {"": value}
+    found = cast("dict[str, Any]", value) if isinstance(value, dict) else {"": value}
     if not all(isinstance(each, dict) for each in found.values()):
         raise ValueError(f"{name}: expected tables, such as [{name}.NAME]")
 

@@ -22,7 +22,7 @@ from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import MotionStopped, another
 from dobot_async.fleet.admission import admit_together, turns
-from dobot_async.fleet.seat import Seat, tell_to_stop
+from dobot_async.fleet.seat import FleetArm, tell_to_stop
 from dobot_async.fleet.work import on_the_way_out, side_by_side
 from dobot_async.fleet.zones import Zones
 
@@ -129,7 +129,7 @@ class Launch:
         timeout: Seconds for the arms to finish what they do, for the zones, and for room in their queues.
     """
 
-    seats: Mapping[str, Seat]
+    seats: Mapping[str, FleetArm]
     batches: Mapping[str, Collected]
     epochs: Mapping[str, Epoch]
     zones: Zones
@@ -219,12 +219,12 @@ class Launch:
         return sent, loop.time()
 
 
-async def room(seat: Seat) -> int:
+async def room(seat: FleetArm) -> int:
     """Returns how many commands an arm takes while it is paused."""
     return await seat.arm.request(seat.family.room, None) if seat.family.room else PLENTY
 
 
-async def measure(seat: Seat) -> float:
+async def measure(seat: FleetArm) -> float:
     """Returns how many seconds a message takes to an arm: half of a typical round trip."""
     loop = asyncio.get_running_loop()
     trips: list[float] = []
@@ -236,7 +236,7 @@ async def measure(seat: Seat) -> float:
     return statistics.median(trips) / 2
 
 
-async def give_up(seats: Mapping[str, Seat]) -> list[str]:
+async def give_up(seats: Mapping[str, FleetArm]) -> list[str]:
     """Stops arms that were to start, so that what was loaded does not run later.
 
     Returns:

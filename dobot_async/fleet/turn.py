@@ -8,7 +8,7 @@ from contextlib import nullcontext
 import anyio
 
 from dobot_async.errors import ReplyTimeout
-from dobot_async.fleet.claims import Party, Pause
+from dobot_async.fleet.claims import ProgramWait, ZoneHolder
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Turn"]
@@ -26,7 +26,7 @@ class Turn:
         self._name = name
         self._zones = zones
         self._order = anyio.Lock(fast_acquire=True)
-        self._commanding: tuple[Party, ...] = ()
+        self._commanding: tuple[ZoneHolder, ...] = ()
 
     async def take(self, deadline: float | None) -> None:
         """Takes the lock of the order: nobody else commands the arm until `end`.
@@ -37,7 +37,7 @@ class Turn:
         """
         program = here()
         stuck = self._zones.driven(program) | {program.party}
-        turn = Pause(f"to command {self._name} behind", program.party, stuck, lambda: self._commanding)
+        turn = ProgramWait(f"to command {self._name} behind", program.party, stuck, lambda: self._commanding)
         try:
             async with asyncio.timeout_at(deadline):
                 with self._zones.claims.pausing(turn) if self._order.locked() else nullcontext():

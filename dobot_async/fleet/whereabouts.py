@@ -23,8 +23,8 @@ from typing import Generic, Protocol, TypeVar
 
 from dobot_async.arms.magician.paths import STEP
 from dobot_async.errors import DobotError
-from dobot_async.fleet.claims import Claim, Party
-from dobot_async.fleet.course import Course, Step
+from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
+from dobot_async.fleet.course import PlannedCourse, PlannedStep
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.planner import Planner, Region, Stance
 from dobot_async.fleet.zones import Zones
@@ -59,11 +59,11 @@ class Whereabouts(Generic[S]):
 
     def __init__(
         self,
-        steps: deque[Step],
+        steps: deque[PlannedStep],
         planner: Planner[S],
         queue: Stops,
         zones: Zones,
-        party: Party,
+        party: ZoneHolder,
         *,
         base: BaseFrame,
         clearance: float,
@@ -75,7 +75,7 @@ class Whereabouts(Generic[S]):
         self._party = party
         self._base = base
         self._margin = clearance + STEP / 2 + ROUNDING
-        self._claims: list[Claim] = []
+        self._claims: list[ZoneRequest] = []
         self._stance: S | None = None  # after all steps
         self._standing: frozenset[str] = frozenset()
         self._located = False
@@ -90,7 +90,7 @@ class Whereabouts(Generic[S]):
         """The zones that the arm is in, or has ahead."""
         return frozenset[str]().union(*(claim.zones for claim in self._claims))
 
-    def enter(self, course: Course[S], claim: Claim | None) -> None:
+    def enter(self, course: PlannedCourse[S], claim: ZoneRequest | None) -> None:
         """Take note that what was looked at is sent now, with a claim on its zones that was granted."""
         if claim:
             self._claims.append(claim)
@@ -137,7 +137,7 @@ class Whereabouts(Generic[S]):
         finally:
             self._settle()
 
-    def _done(self, step: Step) -> None:
+    def _done(self, step: PlannedStep) -> None:
         """Take note that the first step is done."""
         if step.homing is not None:
             self._planner.homed(step.homing)
@@ -201,7 +201,7 @@ class Whereabouts(Generic[S]):
             self.unsure()
 
     @asynccontextmanager
-    async def _loosened(self, claim: Claim | None) -> AsyncGenerator[None]:
+    async def _loosened(self, claim: ZoneRequest | None) -> AsyncGenerator[None]:
         """While this is entered, the arm may be wherever a claim lets it, and its stance is not known."""
         if claim:
             self._claims.append(claim)
@@ -251,9 +251,9 @@ class Whereabouts(Generic[S]):
         """The zones in its reach."""
         return self._zones_of(self._planner.reach(self._stance))
 
-    def _zones_of(self, region: Region) -> frozenset[str]:
-        """The zones in a region."""
-        return region.zones(self._zones, self._base, self._margin)
+    def _zones_of(self, region: Region, shift: float = 0.0) -> frozenset[str]:
+        """The zones in a region, of a tool that may be so many mm elsewhere."""
+        return region.zones(self._zones, self._base, self._margin + shift)
 
     def _settle(self) -> None:
         """Hold what the arm is in or has ahead, and nothing else.
@@ -265,7 +265,7 @@ class Whereabouts(Generic[S]):
         needed = ahead | self._standing
         missing = (ahead | self._party.inside & self._standing | self._standing.difference(*others)) - self.holds
         if missing:
-            claim = Claim(self._party, frozenset([self._party]), missing)
+            claim = ZoneRequest(self._party, frozenset([self._party]), missing)
             self._claims.append(claim)
             self._zones.claims.take(claim)
 

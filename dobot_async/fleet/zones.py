@@ -17,9 +17,9 @@ from weakref import WeakSet
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.util.shapes import Shape
 from dobot_async.errors import DobotError, ReplyTimeout, another
-from dobot_async.fleet.claims import Claim, Claims, Party
+from dobot_async.fleet.claims import ZoneHolder, ZoneLocks, ZoneRequest
 
-__all__ = ["Program", "Run", "Zones", "here", "running"]
+__all__ = ["FleetProgram", "Run", "Zones", "here", "running"]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -31,12 +31,12 @@ class Run:
         alive: The names of those that have not ended.
     """
 
-    parties: Mapping[str, Party]
+    parties: Mapping[str, ZoneHolder]
     alive: set[str] = field(default_factory=set[str])
 
 
 @dataclass(eq=False)
-class Program:
+class FleetProgram:
     """A task that commands arms.
 
     Attributes:
@@ -48,9 +48,9 @@ class Program:
         epoch: That of the fleet in which it began; None for a task that the fleet has not begun.
     """
 
-    party: Party
+    party: ZoneHolder
     task: asyncio.Task[object] | None
-    parent: Program | None = None
+    parent: FleetProgram | None = None
     arm: str | None = None
     run: Run | None = None
     epoch: Epoch | None = None
@@ -66,34 +66,34 @@ class Program:
         for program in self.line():
             program.epoch = program.epoch and epoch
 
-    def line(self) -> Iterator[Program]:
+    def line(self) -> Iterator[FleetProgram]:
         """Yields it and those that it acts for."""
-        program: Program | None = self
+        program: FleetProgram | None = self
         while program:
             yield program
             program = program.parent
 
-    def part(self) -> Program | None:
+    def part(self) -> FleetProgram | None:
         """Returns the program of a run that it is, or acts for."""
         return next((each for each in self.line() if each.run), None)
 
 
-current: ContextVar[Program | None] = ContextVar("dobot_async program", default=None)
+current: ContextVar[FleetProgram | None] = ContextVar("dobot_async program", default=None)
 
 
-def here() -> Program:
+def here() -> FleetProgram:
     """Returns the program that runs now, always the same one in a task."""
     found, task = current.get(), asyncio.current_task()
     if found and found.task is task:
         return found
 
-    program = Program(Party(task.get_name() if task else "nobody"), task, found)
+    program = FleetProgram(ZoneHolder(task.get_name() if task else "nobody"), task, found)
     current.set(program)
     return program
 
 
 @contextmanager
-def running(program: Program) -> Generator[None]:
+def running(program: FleetProgram) -> Generator[None]:
     """While this is entered, `program` is the one that runs here."""
     before = current.get()
     current.set(program)
@@ -116,8 +116,8 @@ class Zones:
     """
 
     shapes: Mapping[str, Shape | None]
-    arms: Mapping[str, Party]
-    claims: Claims = field(default_factory=Claims)
+    arms: Mapping[str, ZoneHolder]
+    claims: ZoneLocks = field(default_factory=ZoneLocks)
     guards: list[Callable[[], Awaitable[None]]] = field(default_factory=list[Callable[[], Awaitable[None]]])
     drivers: dict[str, asyncio.Task[object] | None] = field(default_factory=dict[str, asyncio.Task[object] | None])
     _watched: WeakSet[asyncio.Task[object]] = field(default_factory=WeakSet[asyncio.Task[object]])
@@ -130,14 +130,14 @@ class Zones:
         """Returns the zones that a place of the cell is in, or nearer to than `margin`."""
         return {name for name, shape in self.shapes.items() if shape and shape.contains(x, y, z, margin)}
 
-    def drive(self, arm: str, program: Program) -> None:
+    def drive(self, arm: str, program: FleetProgram) -> None:
         """Takes note that a program moves an arm."""
         self.drivers[arm] = task = program.task
         if task and task not in self._watched:
             self._watched.add(task)
             task.add_done_callback(self._ended)
 
-    def parked(self, program: Program) -> Callable[[Party], bool]:
+    def parked(self, program: FleetProgram) -> Callable[[ZoneHolder], bool]:
         """Returns what tells of an arm that stands whether nobody is left who would move it while a program waits.
 
         That can be told in a run alone: whoever has begun it waits for its end.
@@ -148,7 +148,7 @@ class Zones:
         waiting = {each.task for each in line[first + 1 :]}
         names = {party: arm for arm, party in self.arms.items()}
 
-        def parked(party: Party) -> bool:
+        def parked(party: ZoneHolder) -> bool:
             arm = names.get(party)
             if arm is None or not runs or any(arm in run.alive and arm != own for run, own in runs):
                 return False
@@ -158,18 +158,18 @@ class Zones:
 
         return parked
 
-    def leave(self, program: Program, name: str) -> None:
+    def leave(self, program: FleetProgram, name: str) -> None:
         """Takes note that a program of a run has ended: what nobody moves any more is not waited for."""
         if program.run:
             program.run.alive.discard(name)
 
         self._ended(program.task)
 
-    def driven(self, program: Program) -> frozenset[Party]:
+    def driven(self, program: FleetProgram) -> frozenset[ZoneHolder]:
         """Returns the arms that a program has moved last."""
         return frozenset(self.arms[arm] for arm, task in self.drivers.items() if task is program.task)
 
-    def own(self, program: Program, *arms: str) -> frozenset[Party]:
+    def own(self, program: FleetProgram, *arms: str) -> frozenset[ZoneHolder]:
         """Returns the parties that a program acts for: itself, its parents, the arms that they are for, and others."""
         line = list(program.line())
         named = {*arms, *(each.arm for each in line if each.arm)}
@@ -185,7 +185,7 @@ class Zones:
         program.check()
         own = self.own(program, *arms) | self.driven(program)
         parked = self.parked(program)
-        claim = await self.claim(Claim(program.party, own, frozenset([zone]), parked=parked), timeout)
+        claim = await self.claim(ZoneRequest(program.party, own, frozenset([zone]), parked=parked), timeout)
         try:
             epoch.check()
             with running(program):
@@ -194,8 +194,8 @@ class Zones:
             self.claims.release(claim)
 
     async def claim(
-        self, claim: Claim, timeout: float | None, check: Callable[[], Awaitable[None]] | None = None
-    ) -> Claim:
+        self, claim: ZoneRequest, timeout: float | None, check: Callable[[], Awaitable[None]] | None = None
+    ) -> ZoneRequest:
         """Returns a claim once it is granted.
 
         Args:

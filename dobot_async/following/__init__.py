@@ -8,7 +8,17 @@ Each family brings a small `Strategy`: how its arm is sent to a place in place o
 
 from dobot_async.following.block import MAX_SPEED, MAX_TURN, RATE, STALE, follow_target
 from dobot_async.following.follow import Follow
-from dobot_async.following.points import Point
-from dobot_async.following.strategy import Look, Strategy
+from dobot_async.following.points import TargetPoint
+from dobot_async.following.strategy import FollowStatus, Strategy
 
-__all__ = ["MAX_SPEED", "MAX_TURN", "RATE", "STALE", "Follow", "Look", "Point", "Strategy", "follow_target"]
+__all__ = [
+    "MAX_SPEED",
+    "MAX_TURN",
+    "RATE",
+    "STALE",
+    "Follow",
+    "FollowStatus",
+    "Strategy",
+    "TargetPoint",
+    "follow_target",
+]

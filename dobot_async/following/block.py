@@ -23,7 +23,7 @@ from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_duration
 from dobot_async._core.util.tasks import STAYING, cancel_and_join
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, MotionUnknown, UnsupportedError, another
-from dobot_async.following.follow import SETTLE, Follow, Pace
+from dobot_async.following.follow import SETTLE, Follow, FollowLimits
 from dobot_async.following.strategy import Strategy
 
 __all__ = ["MAX_SPEED", "MAX_TURN", "RATE", "STALE", "follow_target"]
@@ -88,7 +88,7 @@ async def follow_target(
     Raises:
         UnsupportedError: The arm was connected with a workspace.
     """
-    pace = Pace(
+    pace = FollowLimits(
         positive(rate, "rate", FASTEST),
         positive(max_speed, "max_speed"),
         positive(max_turn, "max_turn"),

@@ -25,17 +25,17 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import CommandRejected, MotionStopped, MotionUnknown, another
 from dobot_async.following.points import (
     GRAIN,
-    Point,
+    TargetPoint,
     apart,
     nearer_than,
     part_of_way,
     read_point,
     turns_back,
 )
-from dobot_async.following.strategy import Look, Strategy
+from dobot_async.following.strategy import FollowStatus, Strategy
 from dobot_async.following.trajectory import Trajectory
 
-__all__ = ["SETTLE", "Follow", "Pace"]
+__all__ = ["SETTLE", "Follow", "FollowLimits"]
 
 AGAIN = 0.15  # seconds after which an arm that stands is told once more where to go
 PATIENCE = 1.5  # seconds of standing elsewhere after which an arm does not follow
@@ -45,7 +45,7 @@ STEPS = 3.0  # intervals of `rate` by which a setpoint moves on at the most, how
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class FollowLimits:
     """How a target is followed.
 
     Attributes:
@@ -69,27 +69,27 @@ class Follow:
         sent: How many setpoints were sent.
     """
 
-    def __init__(self, strategy: Strategy, motion: Motion, pace: Pace, outages: Any) -> None:
+    def __init__(self, strategy: Strategy, motion: Motion, pace: FollowLimits, outages: Any) -> None:
         self.motion = motion
         self.sent = 0
         self._strategy = strategy
         self._pace = pace
         self._outages = outages  # returns how often the link was lost
         self._now = asyncio.get_running_loop().time
-        self._target: Point | None = None
+        self._target: TargetPoint | None = None
         self._renewed_at = -math.inf
         self._stirred = asyncio.Event()
         self._began = asyncio.Event()
         self._closing = False
-        self._here: dict[bool, Point] = {}
+        self._here: dict[bool, TargetPoint] = {}
         self._moved_at = self._checked_at = -math.inf
-        self._setpoint: Point | None = None
+        self._setpoint: TargetPoint | None = None
         self._moved_on_at = 0.0
-        self._sent_from: Point | None = None
-        self._sent_to: Point | None = None
+        self._sent_from: TargetPoint | None = None
+        self._sent_to: TargetPoint | None = None
 
     @property
-    def target(self) -> Point | None:
+    def target(self) -> TargetPoint | None:
         """The newest target. Set it, again and again, to a pose, or to numbers: x, y, z (mm) and angles (degrees).
 
         Angles that are not given stay as they are. What is set counts for `stale` seconds, also if it is the same.
@@ -115,7 +115,7 @@ class Follow:
         self._renew(self._read(angles, joints=True))
 
     @property
-    def here(self) -> Point | None:
+    def here(self) -> TargetPoint | None:
         """Where the arm was when it was last looked at, in coordinates."""
         return self._here.get(False)
 
@@ -202,7 +202,7 @@ class Follow:
             failure = self.motion.exception()
             raise another(failure) if failure else MotionStopped("the block of the following has ended")
 
-    def _read(self, target: Any, *, joints: bool = False) -> Point:
+    def _read(self, target: Any, *, joints: bool = False) -> TargetPoint:
         """The checked place of a target."""
         self.check()
         before = self._target or self.here
@@ -210,13 +210,13 @@ class Follow:
         self._strategy.allow(point)
         return point
 
-    def _renew(self, point: Point) -> None:
+    def _renew(self, point: TargetPoint) -> None:
         """Follow a checked target from now on."""
         self.check()
         self._target, self._renewed_at = point, self._now()
         self._stirred.set()
 
-    async def _reach(self, point: Point) -> None:
+    async def _reach(self, point: TargetPoint) -> None:
         """Follow a target until the arm is there."""
         while True:
             self._renew(point)
@@ -227,7 +227,7 @@ class Follow:
 
             await asyncio.sleep(1 / self._pace.rate)
 
-    async def _lead(self, target: Point) -> None:
+    async def _lead(self, target: TargetPoint) -> None:
         """Look where the arm is, and send it on if that is due."""
         strategy, pace = self._strategy, self._pace
         look = await strategy.look(joints=target.joints)
@@ -251,7 +251,7 @@ class Follow:
             self._checked_at = now
             await strategy.check()
 
-    async def _send(self, here: Point, setpoint: Point) -> None:
+    async def _send(self, here: TargetPoint, setpoint: TargetPoint) -> None:
         """Send the arm to a setpoint."""
         try:
             self._strategy.allow(setpoint)
@@ -263,7 +263,7 @@ class Follow:
         if not await self._strategy.go(setpoint):
             self._sent_to = None
 
-    def _is_due(self, look: Look, setpoint: Point) -> bool:
+    def _is_due(self, look: FollowStatus, setpoint: TargetPoint) -> bool:
         """Whether the arm is to be sent to a setpoint now."""
         distance = partial(apart, turns=self._strategy.turns)
         here, start, sent = look.here, self._sent_from, self._sent_to
@@ -282,7 +282,7 @@ class Follow:
         past_middle = distance(here, sent) <= distance(start, sent) / 2
         return past_middle or turns_back(here, sent, setpoint, turns=self._strategy.turns)
 
-    def _seen(self, look: Look) -> None:
+    def _seen(self, look: FollowStatus) -> None:
         """Note where the arm is."""
         before = self._here.get(look.here.joints)
         if before is None or apart(before, look.here, turns=self._strategy.turns) > GRAIN:
@@ -290,11 +290,11 @@ class Follow:
 
         self._here[look.here.joints] = look.here
 
-    def _is_at(self, here: Point, place: Point) -> bool:
+    def _is_at(self, here: TargetPoint, place: TargetPoint) -> bool:
         """Whether the arm is at a place."""
         return nearer_than(here, place, self._strategy.tolerance, turns=self._strategy.turns)
 
-    def _check_standing(self, here: Point, wanted: Point) -> None:
+    def _check_standing(self, here: TargetPoint, wanted: TargetPoint) -> None:
         """Raise CommandRejected if the arm has stood for long, elsewhere than it is wanted."""
         if self._now() > self._moved_at + PATIENCE and not self._is_at(here, wanted):
             raise CommandRejected(

@@ -9,14 +9,14 @@ from typing import Any, SupportsFloat, cast
 
 from dobot_async._core.util.arguments import to_float
 
-__all__ = ["Point", "apart", "nearer_than", "part_of_way", "read_point", "turns_back", "way_along"]
+__all__ = ["TargetPoint", "apart", "nearer_than", "part_of_way", "read_point", "turns_back", "way_along"]
 
 GRAIN = 0.02
 """mm and degrees; what is nearer is the same place."""
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class TargetPoint:
     """A place.
 
     Attributes:
@@ -31,7 +31,9 @@ class Point:
         return f"{'joints ' if self.joints else ''}({', '.join(f'{number:.6g}' for number in self.numbers)})"
 
 
-def read_point(target: Any, axes: Sequence[str], joints: int, here: Point | None, *, as_joints: bool = False) -> Point:
+def read_point(
+    target: Any, axes: Sequence[str], joints: int, here: TargetPoint | None, *, as_joints: bool = False
+) -> TargetPoint:
     """Return the place that a target says.
 
     Args:
@@ -70,10 +72,10 @@ def read_point(target: Any, axes: Sequence[str], joints: int, here: Point | None
 
         numbers += here.numbers[len(numbers) :]
 
-    return Point(tuple(numbers), as_joints)
+    return TargetPoint(tuple(numbers), as_joints)
 
 
-def gaps(start: Point, end: Point, *, turns: bool) -> list[float]:
+def gaps(start: TargetPoint, end: TargetPoint, *, turns: bool) -> list[float]:
     """How far it is in each number; with `turns` angles of a pose go the short way round."""
     found = [b - a for a, b in zip(start.numbers, end.numbers, strict=True)]
     if turns and not end.joints:
@@ -82,25 +84,25 @@ def gaps(start: Point, end: Point, *, turns: bool) -> list[float]:
     return found
 
 
-def way_along(start: Point, end: Point, *, turns: bool = False) -> tuple[float, float]:
+def way_along(start: TargetPoint, end: TargetPoint, *, turns: bool = False) -> tuple[float, float]:
     """Return how far it is: mm in a straight line, and degrees of the angle that turns most."""
     found = gaps(start, end, turns=turns)
     split = 0 if end.joints else 3
     return math.hypot(*found[:split]), max(map(abs, found[split:]), default=0.0)
 
 
-def apart(start: Point, end: Point, *, turns: bool = False) -> float:
+def apart(start: TargetPoint, end: TargetPoint, *, turns: bool = False) -> float:
     """Return how far it is as one number, for comparing: mm and degrees count the same."""
     return math.hypot(*way_along(start, end, turns=turns))
 
 
-def nearer_than(here: Point, there: Point, tolerance: tuple[float, float], *, turns: bool = False) -> bool:
+def nearer_than(here: TargetPoint, there: TargetPoint, tolerance: tuple[float, float], *, turns: bool = False) -> bool:
     """Return whether one place is within a tolerance, mm and degrees, of another."""
     mm, degrees = way_along(here, there, turns=turns)
     return mm <= tolerance[0] and degrees <= tolerance[1]
 
 
-def part_of_way(start: Point, end: Point, mm: float, degrees: float, *, turns: bool = False) -> Point:
+def part_of_way(start: TargetPoint, end: TargetPoint, mm: float, degrees: float, *, turns: bool = False) -> TargetPoint:
     """Return the place on the straight way that is no further than so many mm and degrees from its start."""
     length, turn = way_along(start, end, turns=turns)
     share = min(1.0, mm / length if length > mm else 1.0, degrees / turn if turn > degrees else 1.0)
@@ -111,10 +113,10 @@ def part_of_way(start: Point, end: Point, mm: float, degrees: float, *, turns: b
     if turns and not end.joints:
         moved[3:] = [angle if abs(angle) <= 180 else math.remainder(angle, 360) for angle in moved[3:]]
 
-    return Point(tuple(moved), end.joints)
+    return TargetPoint(tuple(moved), end.joints)
 
 
-def turns_back(here: Point, sent: Point, wanted: Point, *, turns: bool = False) -> bool:
+def turns_back(here: TargetPoint, sent: TargetPoint, wanted: TargetPoint, *, turns: bool = False) -> bool:
     """Return whether the way to a place leads back from where the arm goes."""
     ahead, now = gaps(here, sent, turns=turns), gaps(here, wanted, turns=turns)
     return sum(a * b for a, b in zip(ahead, now, strict=True)) < 0

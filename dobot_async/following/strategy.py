@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from dobot_async.following.points import Point
+from dobot_async.following.points import TargetPoint
 
-__all__ = ["Look", "Strategy"]
+__all__ = ["FollowStatus", "Strategy"]
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class FollowStatus:
     """What an arm told at one time.
 
     Attributes:
@@ -20,7 +20,7 @@ class Look:
         rests: Whether it says that it stands with nothing more to do; None where it does not say.
     """
 
-    here: Point
+    here: TargetPoint
     rests: bool | None = None
 
 
@@ -57,21 +57,21 @@ class Strategy(Protocol):
         """Seconds between two calls of `check`."""
         ...
 
-    def allow(self, point: Point) -> None:
+    def allow(self, point: TargetPoint) -> None:
         """Raise ValueError for a place that is beyond the limits, or out of reach."""
 
     async def begin(self) -> None:
         """Make the arm ready to be led; raise CommandRejected if it cannot be now."""
 
-    async def look(self, *, joints: bool) -> Look:
+    async def look(self, *, joints: bool) -> FollowStatus:
         """Return where the arm is, as coordinates or as joints; raise ReplyTimeout if it is silent."""
         ...
 
-    def within(self, look: Look, point: Point) -> Point:
+    def within(self, look: FollowStatus, point: TargetPoint) -> TargetPoint:
         """Return how far towards a place the arm may be sent from where it is."""
         ...
 
-    async def go(self, point: Point) -> bool:
+    async def go(self, point: TargetPoint) -> bool:
         """Send the arm to a place, once; return False if that is known to have been lost.
 
         Raises:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from dobot_async._core.util.arguments import check_duration
-from dobot_async.following.points import GRAIN, Point, part_of_way, way_along
+from dobot_async.following.points import GRAIN, TargetPoint, part_of_way, way_along
 
 __all__ = ["Trajectory"]
 
@@ -38,7 +38,7 @@ class Trajectory:
     def __init__(
         self,
         points: Iterable[tuple[float, Any]],
-        read: Callable[[Any], Point],
+        read: Callable[[Any], TargetPoint],
         *,
         mm: float,
         degrees: float,
@@ -46,7 +46,7 @@ class Trajectory:
     ) -> None:
         self._turns = turns
         self._times: list[float] = []
-        self._places: list[Point] = []
+        self._places: list[TargetPoint] = []
         for number, (seconds, target) in enumerate(points):
             try:
                 self._times.append(check_duration(seconds, "the time"))
@@ -72,7 +72,7 @@ class Trajectory:
         self.first, self.last = self._places[0], self._places[-1]
         self.seconds = self._times[-1] - self._times[0]
 
-    def at(self, elapsed: float) -> Point:
+    def at(self, elapsed: float) -> TargetPoint:
         """Return the place after some seconds."""
         time = self._times[0] + elapsed
         number = bisect_right(self._times, time)

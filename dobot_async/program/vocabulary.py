@@ -17,13 +17,24 @@ from dobot_async._core.protocol.wire import Command
 from dobot_async.program.step import ProgramError, Step
 from dobot_async.program.text import parse_number, shortened
 
-__all__ = ["NUMBER", "ON_OFF", "WHOLE", "Kind", "Reader", "Verb", "Vocabulary", "bare", "choice", "takes"]
+__all__ = [
+    "NUMBER",
+    "ON_OFF",
+    "WHOLE",
+    "ArgumentKind",
+    "ProgramReader",
+    "Verb",
+    "Vocabulary",
+    "bare",
+    "choice",
+    "takes",
+]
 
 Result = tuple[Command[Any, Any], Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class ArgumentKind:
     """What a word may be.
 
     Attributes:
@@ -46,18 +57,18 @@ def parse_whole(text: str) -> int:
     return int(found)
 
 
-def choice(words: Mapping[str, Any], label: str = "") -> Kind:
+def choice(words: Mapping[str, Any], label: str = "") -> ArgumentKind:
     """One of several words."""
-    return Kind(lambda text: words[text.lower()], f"one of {', '.join(words)}", label)
+    return ArgumentKind(lambda text: words[text.lower()], f"one of {', '.join(words)}", label)
 
 
 MOST = 2**53
-NUMBER = Kind(parse_number, "a number")
-WHOLE = Kind(parse_whole, "a whole number")
-ON_OFF = Kind(lambda text: {"on": True, "off": False}[text.lower()], "on or off", "on|off")
+NUMBER = ArgumentKind(parse_number, "a number")
+WHOLE = ArgumentKind(parse_whole, "a whole number")
+ON_OFF = ArgumentKind(lambda text: {"on": True, "off": False}[text.lower()], "on or off", "on|off")
 
 
-def takes(kind: Kind, *names: str) -> tuple[tuple[str, Kind], ...]:
+def takes(kind: ArgumentKind, *names: str) -> tuple[tuple[str, ArgumentKind], ...]:
     """Arguments of one kind."""
     return tuple((name, kind) for name in names)
 
@@ -74,9 +85,9 @@ class Verb:
     """
 
     call: Callable[..., Result]
-    arguments: tuple[tuple[str, Kind], ...] = ()
+    arguments: tuple[tuple[str, ArgumentKind], ...] = ()
     needed: int = 0
-    options: Mapping[str, Kind] = field(default_factory=dict[str, Kind])
+    options: Mapping[str, ArgumentKind] = field(default_factory=dict[str, ArgumentKind])
 
     def usage(self, name: str) -> str:
         """How it is written."""
@@ -101,9 +112,9 @@ class Vocabulary:
     verbs: Mapping[str, Verb]
     checked: Callable[[Mapping[str, Any]], Any]
 
-    def reader(self, options: Mapping[str, Any] = MappingProxyType({})) -> Reader:
+    def reader(self, options: Mapping[str, Any] = MappingProxyType({})) -> ProgramReader:
         """Begin to read a program for an arm that is connected with these options."""
-        return Reader(self, self.checked(options))
+        return ProgramReader(self, self.checked(options))
 
     def parse(self, lines: Iterable[str], options: Mapping[str, Any] = MappingProxyType({})) -> tuple[Step, ...]:
         """Return a program's steps.
@@ -132,7 +143,7 @@ class Vocabulary:
         return "; ".join(verb.usage(name) for name, verb in self.verbs.items())
 
 
-class Reader:
+class ProgramReader:
     """Reads the lines of one program, each of which may depend on those before it.
 
     Attributes:
@@ -186,7 +197,7 @@ def bare(written: str) -> str:
     return written.split("#", 1)[0].strip()
 
 
-def read(name: str, kind: Kind, text: str) -> Any:
+def read(name: str, kind: ArgumentKind, text: str) -> Any:
     """Return what a word stands for."""
     try:
         return kind.read(text)

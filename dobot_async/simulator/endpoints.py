@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from urllib.parse import urlsplit
 
 from dobot_async.arms.registry import Parts
-from dobot_async.endpoints.line_rate import AtBaud
+from dobot_async.endpoints.line_rate import RateLimited
 from dobot_async.endpoints.listeners import on_tcp, on_udp
 from dobot_async.endpoints.pty import on_pty
 from dobot_async.simulator.faults import Faults
@@ -205,7 +205,7 @@ async def on_line(simulation: Simulation, stack: AsyncExitStack, *, baud: int | 
     if baud <= 0:
         raise ValueError(f"baud must be above 0, not {baud}")
 
-    return await on_pty(AtBaud(simulation, baud), stack)
+    return await on_pty(RateLimited(simulation, baud), stack)
 
 
 LOCAL: dict[str, tuple[Callable[..., Awaitable[str]], Mapping[str, Callable[[str], Any]]]] = {

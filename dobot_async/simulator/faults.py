@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from random import Random
 
-__all__ = ["LONGEST", "MEANS", "PROBABILITIES", "TIMES", "Channel", "Faults", "LineState"]
+__all__ = ["LONGEST", "MEANS", "PROBABILITIES", "TIMES", "Faults", "FaultyChannel", "LineState"]
 
 PROBABILITIES = ("loss", "corrupt", "dup", "split", "noise", "merge", "stall", "late", "silence")
 TIMES = ("latency", "jitter", "reorder")
@@ -147,7 +147,7 @@ class LineState:
     silent_until: float = -math.inf
 
 
-class Channel:
+class FaultyChannel:
     """One direction of a line with faults: takes messages, hands over what arrives when it arrives.
 
     Args:

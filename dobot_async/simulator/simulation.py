@@ -13,7 +13,7 @@ from collections.abc import Callable
 from random import Random
 from typing import TYPE_CHECKING, Any, Generic, Protocol
 
-from dobot_async.simulator.faults import Channel, Faults, LineState
+from dobot_async.simulator.faults import Faults, FaultyChannel, LineState
 from dobot_async.simulator.scene import Scene
 
 if TYPE_CHECKING:
@@ -25,12 +25,12 @@ else:
 
     A = TypeVar("A")
 
-__all__ = ["Client", "Session", "Simulation"]
+__all__ = ["ArmSession", "SimulatedClient", "Simulation"]
 
 SILENCE = 1.0  # seconds after which a client that cannot be seen to leave counts as another one
 
 
-class Session(Protocol):
+class ArmSession(Protocol):
     """An arm's side of a connection."""
 
     def receive(self, data: bytes) -> bytes:
@@ -57,8 +57,8 @@ class Simulation(Generic[A]):
         self.outages: list[tuple[float, float]] = []
         self._scene = scene
         self._random = Random(seed)  # noqa: S311 - repeatable faults, no secrets
-        self._clients: dict[Client, None] = {}
-        self._departed: list[Client] = []
+        self._clients: dict[SimulatedClient, None] = {}
+        self._departed: list[SimulatedClient] = []
         self._ended = False
 
     @property
@@ -77,10 +77,10 @@ class Simulation(Generic[A]):
         ordered: bool,
         hold: Callable[[bool], None] = lambda _: None,
         name: str = "",  # noqa: ARG002 - an arm tells of nobody
-    ) -> Client:
+    ) -> SimulatedClient:
         """Called by an endpoint: somebody has connected, and takes replies by `deliver`."""
         arm: Any = self.arm
-        client = Client(
+        client = SimulatedClient(
             arm.session,
             self.faults,
             self._random,
@@ -96,7 +96,7 @@ class Simulation(Generic[A]):
 
         return client
 
-    def leave(self, client: Client) -> None:
+    def leave(self, client: SimulatedClient) -> None:
         """Called by an endpoint: a client has gone. What it has sent before still reaches the arm."""
         if client in self._clients:
             del self._clients[client]
@@ -128,12 +128,12 @@ class Simulation(Generic[A]):
         self.unplug()
 
 
-class Client:
+class SimulatedClient:
     """One client's line to the arm and back."""
 
     def __init__(
         self,
-        session: Callable[[], Session],
+        session: Callable[[], ArmSession],
         faults: Faults,
         random: Random,
         deliver: Callable[[bytes], None],
@@ -151,8 +151,8 @@ class Client:
         self._sent = self._loop.time()
         self._gone = self._deaf = False
         state = LineState(outages)
-        self._back = Channel(faults, random, deliver, ordered=ordered, state=state, from_arm=True)
-        self._there = Channel(faults, random, self._answer, ordered=ordered, state=state)
+        self._back = FaultyChannel(faults, random, deliver, ordered=ordered, state=state, from_arm=True)
+        self._there = FaultyChannel(faults, random, self._answer, ordered=ordered, state=state)
 
     @property
     def sending(self) -> bool:

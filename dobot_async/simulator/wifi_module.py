@@ -46,7 +46,7 @@ async def announced(url: str, host: str = ANY, port: int = PORT) -> AsyncGenerat
     answer = f"{address},02D0{address.packed.hex().upper()},{MODULE}".encode()
     loop = asyncio.get_running_loop()
     transport, _ = await loop.create_datagram_endpoint(
-        lambda: Module(answer), local_addr=(host, port), allow_broadcast=True
+        lambda: WiFiModule(answer), local_addr=(host, port), allow_broadcast=True
     )
     try:
         yield transport.get_extra_info("sockname")[1]
@@ -54,7 +54,7 @@ async def announced(url: str, host: str = ANY, port: int = PORT) -> AsyncGenerat
         transport.close()
 
 
-class Module(asyncio.DatagramProtocol):
+class WiFiModule(asyncio.DatagramProtocol):
     """Answers who asks the one question that it knows."""
 
     def __init__(self, answer: bytes) -> None:

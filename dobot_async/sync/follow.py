@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from dobot_async.following.follow import Follow as AsyncFollow
-from dobot_async.following.points import Point
+from dobot_async.following.points import TargetPoint
 from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.twin import Twin
@@ -31,7 +31,7 @@ class Follow(Twin[AsyncFollow]):
         return self.asynchronous.sent
 
     @property
-    def target(self) -> Point | None:
+    def target(self) -> TargetPoint | None:
         """The newest target. Set it, again and again, to a pose, or to numbers: x, y, z (mm) and angles (degrees).
 
         Angles that are not given stay as they are. What is set counts for `stale` seconds, also if it is the same.
@@ -57,7 +57,7 @@ class Follow(Twin[AsyncFollow]):
         PORTAL.look(lambda: setattr(self.asynchronous, "joints", angles))
 
     @property
-    def here(self) -> Point | None:
+    def here(self) -> TargetPoint | None:
         """Where the arm was when it was last looked at, in coordinates."""
         return self.asynchronous.here
 

@@ -19,8 +19,8 @@ from dobot_async.arms.magician.following import Way
 from dobot_async.arms.magician.jogs import Jog
 from dobot_async.arms.magician.kinematics import Kinematics
 from dobot_async.arms.magician.queue import Batch as AsyncBatch
+from dobot_async.arms.magician.queue import Download as AsyncDownload
 from dobot_async.arms.magician.queue import MagicianQueue as AsyncMagicianQueue
-from dobot_async.arms.magician.queue import Program as AsyncProgram
 from dobot_async.arms.magician.verbs import Verbs
 from dobot_async.arms.magician.wifi import WiFi as AsyncWiFi
 from dobot_async.arms.magician.wifi import WiFiSettings
@@ -32,7 +32,7 @@ from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.twin import Block, Items, Twin, same
 from dobot_async.traces.recorder import Record
 
-__all__ = ["Batch", "Magician", "MagicianQueue", "Program", "WiFi"]
+__all__ = ["Batch", "Download", "Magician", "MagicianQueue", "WiFi"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
@@ -46,7 +46,7 @@ class Batch(BatchTwin[AsyncBatch], Verbs[Motion]):
         return Motion(PORTAL.look(lambda: self.asynchronous.put(command, value)))
 
 
-class Program(BatchTwin[AsyncProgram], Verbs[Motion]):
+class Download(BatchTwin[AsyncDownload], Verbs[Motion]):
     """Commands to be stored in the arm; nobody waits for their Motions."""
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
@@ -87,7 +87,7 @@ class MagicianQueue(QueueTwin[AsyncMagicianQueue], Verbs[Motion]):
         """
         return Block(lambda: self.asynchronous.batch(timeout=timeout), Batch, "batch")
 
-    def download(self, *, loops: int = 1) -> AbstractContextManager[Program]:
+    def download(self, *, loops: int = 1) -> AbstractContextManager[Download]:
         """Store the commands of the block in the arm, which runs them when its key is pressed. Manual 2.19.4.
 
         A cancellation or a stop ends it, and the arm executes again what it is told. After power-up the arm knows of no
@@ -100,7 +100,7 @@ class MagicianQueue(QueueTwin[AsyncMagicianQueue], Verbs[Motion]):
             ValueError: A rail or a pin that a command needs was declared neither to the arm nor in the program.
             MotionStopped: The arm was stopped meanwhile; a part of the program may be stored.
         """
-        return Block(lambda: self.asynchronous.download(loops=loops), Program, "download")
+        return Block(lambda: self.asynchronous.download(loops=loops), Download, "download")
 
     def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
         """Give one command to the arm's queue and return once the arm has accepted it.

@@ -16,7 +16,7 @@ from dobot_async.arms.info import DeviceInfo
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.arm import UltraArm as AsyncUltraArm
 from dobot_async.arms.ultraarm.gcode import Source
-from dobot_async.arms.ultraarm.goals import Fault
+from dobot_async.arms.ultraarm.goals import MotionFault
 from dobot_async.arms.ultraarm.jog import UltraArmJog
 from dobot_async.arms.ultraarm.queue import UltraArmBatch as AsyncUltraArmBatch
 from dobot_async.arms.ultraarm.queue import UltraArmQueue as AsyncUltraArmQueue
@@ -354,7 +354,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
         """Return who the arm is: it tells the version of its firmware alone, and older firmware not even that."""
         return PORTAL.run(lambda: self.asynchronous.get_info(timeout=timeout))
 
-    def get_alarms(self, *, timeout: float | None = None) -> tuple[Fault, ...]:
+    def get_alarms(self, *, timeout: float | None = None) -> tuple[MotionFault, ...]:
         """Return what is known to keep the arm from moving: no power, or no place since it had none.
 
         The protocol has no alarms. This is what the program itself has done to the arm; what others did shows when a

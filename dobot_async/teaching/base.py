@@ -15,10 +15,10 @@ from dobot_async.errors import CommandRejected, UnsupportedError
 from dobot_async.handling.arms import settle_time, stop_check
 from dobot_async.teaching.recording import Mode, PathSample, Recording, TaughtStep
 
-__all__ = ["Limits", "TaughtArm", "clip"]
+__all__ = ["RecordingLimits", "TaughtArm", "clip"]
 
 
-class Limits(ABC):
+class RecordingLimits(ABC):
     """What an arm of a family can be told.
 
     Attributes:
@@ -120,7 +120,7 @@ class TaughtArm(ABC):
         check_stop: Raises if the arm was stopped since this was made: nothing is played past a stop.
     """
 
-    limits: Limits
+    limits: RecordingLimits
     mode: Mode
     turn: str
 

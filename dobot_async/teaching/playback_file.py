@@ -46,7 +46,7 @@ ROW_LEVEL, ITEM_LEVEL = 1, 2
 WORDS = {"jump": 0, "point": 1, "line": 2, "arc": 3}
 
 
-class Reader:
+class PlaybackReader:
     """Finds the rows of a file; what is neither a row nor an item of one is a remark."""
 
     def __init__(self, file: str) -> None:
@@ -140,7 +140,7 @@ def read_playback(source: str | Path | bytes) -> Recording:
     if len(data) > LARGEST:
         raise RecordingFileError(name, "", f"more than {LARGEST >> 20} MB")
 
-    reader = Reader(name)
+    reader = PlaybackReader(name)
     reader.read(data)
     heads, rows = reader.elements[: len(HEADS)], reader.elements[len(HEADS) :]
     for element in heads:
@@ -159,7 +159,7 @@ def tool_of(steps: list[TaughtStep]) -> str:
     return next((tool for tool in ("suction", "gripper") for step in steps if getattr(step, tool) is not None), "")
 
 
-def step_of(element: Element, reader: Reader) -> TaughtStep:
+def step_of(element: Element, reader: PlaybackReader) -> TaughtStep:
     """Return the step of a row; raise RecordingFileError."""
     for item, text in element.items.items():
         if item not in KNOWN:

@@ -11,7 +11,7 @@ from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.teaching.arms.magician import MagicianLimits, TaughtMagician
 from dobot_async.teaching.arms.mycobot import CobotLimits, TaughtCobot
 from dobot_async.teaching.arms.ultraarm import TaughtUltraArm, UltraArmLimits
-from dobot_async.teaching.base import Limits, TaughtArm
+from dobot_async.teaching.base import RecordingLimits, TaughtArm
 from dobot_async.teaching.problems import RecordingUnfit
 from dobot_async.teaching.recording import Recording
 
@@ -22,7 +22,7 @@ ARMS: Mapping[type, Callable[[Any], TaughtArm]] = {
     MyCobot: TaughtCobot,
     UltraArm: TaughtUltraArm,
 }
-LIMITS: Mapping[str, Callable[[Recording], Limits]] = {
+LIMITS: Mapping[str, Callable[[Recording], RecordingLimits]] = {
     "magician": MagicianLimits.of,
     "mycobot": CobotLimits.of,
     "ultraarm": UltraArmLimits.of,

@@ -27,8 +27,8 @@ from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, another
 from dobot_async.toolpath.moves import Move, Tool, approach, check_moves, from_point
 from dobot_async.toolpath.plane import Place, WorkPlane
-from dobot_async.toolpath.position import Position, Sent, along, stand_of
-from dobot_async.toolpath.programs import Instruction, Pace, check_tool, program_for
+from dobot_async.toolpath.position import Sent, StrokePosition, along, stand_of
+from dobot_async.toolpath.programs import DrawingPace, Instruction, check_tool, program_for
 from dobot_async.toolpath.progress import Progress, ProgressMeter
 from dobot_async.toolpath.reach import reach_of
 from dobot_async.toolpath.schedule import (
@@ -95,7 +95,7 @@ class Drawing:
         self._plane = plane
         self._tool = tool
         self._reach = reach_of(arm)
-        self._pace = Pace(above_zero(acceleration, "acceleration"), whole_percent(percent))
+        self._pace = DrawingPace(above_zero(acceleration, "acceleration"), whole_percent(percent))
         path = simplified(toolpath, tolerance)
         self._strokes = planned(path, plane, tool, speed, rate if isinstance(arm, Magician) else None)
         lengths, guesses = [stroke.length for stroke in path], [guess(moves) for moves in self._strokes]
@@ -104,7 +104,7 @@ class Drawing:
         self._running: asyncio.Task[Any] | None = None
         self._stopped = False
         self._epoch = Epoch()
-        self._position = Position(0)
+        self._position = StrokePosition(0)
 
     @property
     def next_stroke(self) -> int:
@@ -261,10 +261,10 @@ class Drawing:
         self._reached(position)
         return failure
 
-    def _reached(self, position: Position) -> None:
+    def _reached(self, position: StrokePosition) -> None:
         """Note how far it is, and tell it if strokes were done."""
         before = self.next_stroke
-        self._position = position if self._tool == "laser" else Position(position.stroke)
+        self._position = position if self._tool == "laser" else StrokePosition(position.stroke)
         self._meter.reached(before, self.next_stroke, asyncio.get_running_loop().time())
 
 

@@ -22,9 +22,9 @@ from dobot_async.simulator.magician.arm import MAGICIAN, SimulatedMagician
 from dobot_async.simulator.mycobot.arm import SimulatedMyCobot
 from dobot_async.simulator.mycobot.body import MYCOBOT
 from dobot_async.simulator.ultraarm.arm import ULTRAARM, SimulatedUltraArm
-from dobot_async.toolpath.moves import Kind, Tool, approach
+from dobot_async.toolpath.moves import MoveKind, Tool, approach
 from dobot_async.toolpath.plane import Place, WorkPlane
-from dobot_async.toolpath.programs import CobotProgram, MagicianProgram, Pace, Program, UltraArmProgram
+from dobot_async.toolpath.programs import CobotProgram, DrawingPace, DrawingProgram, MagicianProgram, UltraArmProgram
 from dobot_async.toolpath.schedule import RATE, TOLERANCE, planned
 from dobot_async.toolpath.toolpath import Toolpath
 
@@ -76,7 +76,7 @@ class Bench:
     """
 
     def __init__(
-        self, arm: Any, encode: Callable[[Command[Any, Any], bytes], bytes], here: Place, program: Program
+        self, arm: Any, encode: Callable[[Command[Any, Any], bytes], bytes], here: Place, program: DrawingProgram
     ) -> None:
         self.arm = arm
         self.here = here
@@ -127,7 +127,7 @@ def estimate(
     if not moves:
         return Estimate(0.0, 0.0, 0.0, ())
 
-    bench = bench_of(arm, clock, tool, Pace(acceleration, percent), moves[0].place)
+    bench = bench_of(arm, clock, tool, DrawingPace(acceleration, percent), moves[0].place)
 
     instructions = list(bench.program.instructions(approach(bench.here, moves, plane) + moves))
     begun, before = clock.now, len(bench.arm.executed)
@@ -142,7 +142,7 @@ def estimate(
         if record.outcome != "done":
             raise ValueError(f"stroke {stroke} cannot be drawn by the simulated arm")
 
-        if each.move and each.move.kind in {Kind.DRAW, Kind.LIFT}:
+        if each.move and each.move.kind in {MoveKind.DRAW, MoveKind.LIFT}:
             ends[each.move.stroke] = record.finished - begun
 
     if len(done) < len(instructions):
@@ -151,7 +151,7 @@ def estimate(
     return Estimate(done[-1].finished - begun, path.length, path.travel, tuple(ends.values()))
 
 
-def magician(kinematics: Kinematics, clock: Clock, tool: Tool, pace: Pace) -> Bench:
+def magician(kinematics: Kinematics, clock: Clock, tool: Tool, pace: DrawingPace) -> Bench:
     """A Magician with its tool, at home."""
     arm = SimulatedMagician(clock, replace(MAGICIAN, capacity=ROOM, keep=None), limits=kinematics.limits)
     bias = m.EndEffectorParams(kinematics.x_bias, kinematics.y_bias, kinematics.z_bias)
@@ -173,7 +173,7 @@ def ultraarm(clock: Clock, tool: Tool) -> Bench:
     return Bench(arm, encode, place_of(arm.pose), UltraArmProgram(tool))
 
 
-def cobot(model: CobotModel, clock: Clock, pace: Pace, first: Place) -> Bench:
+def cobot(model: CobotModel, clock: Clock, pace: DrawingPace, first: Place) -> Bench:
     """A myCobot that stands above the first stroke, with a hand that looks down."""
     arm = SimulatedMyCobot(clock, replace(MYCOBOT, capacity=ROOM, keep=None), model=model.name)
     rotation = (180.0, 0.0, 0.0) if len(model.reach) == 6 else (0.0,)
@@ -197,7 +197,7 @@ def place_of(pose: Any) -> Place:
     return pose.x, pose.y, pose.z
 
 
-def bench_of(arm: Any, clock: Clock, tool: Tool, pace: Pace, first: Place) -> Bench:
+def bench_of(arm: Any, clock: Clock, tool: Tool, pace: DrawingPace, first: Place) -> Bench:
     """A simulated arm like another one."""
     if isinstance(arm, (Magician, Kinematics)) or arm == "magician":
         return magician(

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from dobot_async._core.util.arguments import to_float
 from dobot_async.toolpath import curves
 from dobot_async.toolpath.errors import ToolpathFileError
-from dobot_async.toolpath.gcode_lines import INCH, Line, WrongLine, lines_of, low_of, switched
+from dobot_async.toolpath.gcode_lines import INCH, GCodeWords, WrongLine, lines_of, low_of, switched
 from dobot_async.toolpath.sources import FINE, Source, check_tolerance, content, name_of
 from dobot_async.toolpath.stroke import FULL, Point, Stroke
 from dobot_async.toolpath.toolpath import Toolpath
@@ -37,7 +37,7 @@ NOT_READ = {18: "another plane than XY", 19: "another plane than XY", 5: "spline
 IGNORED = frozenset({4, 17, 40, 43, 49, 53, 54, 55, 56, 57, 58, 59, 61, 64, 80, 94, 98, 99})
 
 
-class Misfit(ValueError):
+class GCodeProblem(ValueError):
     """What is wrong with a line."""
 
 
@@ -71,7 +71,7 @@ class Machine:
     powers: list[float] = field(default_factory=list[float])
     speed: float | None = None
 
-    def run(self, line: Line) -> None:
+    def run(self, line: GCodeWords) -> None:
         """Do one line: settings first, as machines do, then the way."""
         moving = any(letter in "XYZ" for letter, _ in line.words)
         way = None
@@ -84,7 +84,7 @@ class Machine:
         feed, power = line.get("F"), line.get("S")
         if feed is not None:
             if feed <= 0:
-                raise Misfit(f"F{feed:g}: a feed is above 0")
+                raise GCodeProblem(f"F{feed:g}: a feed is above 0")
             self.feed = feed * self.unit / 60
 
         if power is not None and not any(letter == "M" and number in {106, 280} for letter, number in line.words):
@@ -121,13 +121,13 @@ class Machine:
         elif number in {28, 30}:
             return "home"
         elif number in NOT_READ:
-            raise Misfit(f"G{number:g}: {NOT_READ[int(number)]} cannot be drawn")
+            raise GCodeProblem(f"G{number:g}: {NOT_READ[int(number)]} cannot be drawn")
         elif number not in IGNORED:
-            raise Misfit(f"G{number:g} is not known here")
+            raise GCodeProblem(f"G{number:g} is not known here")
 
         return None
 
-    def _m(self, number: int, line: Line) -> None:
+    def _m(self, number: int, line: GCodeWords) -> None:
         """An M word."""
         if number in {3, 4}:
             self.on = True
@@ -141,11 +141,11 @@ class Machine:
 
     def _percent(self, power: float, full: float, letter: str = "S") -> float:
         if not 0 <= power <= full:
-            raise Misfit(f"{letter}{power:g} is not in 0 to {full:g}; if it is no mistake, give full_power=")
+            raise GCodeProblem(f"{letter}{power:g} is not in 0 to {full:g}; if it is no mistake, give full_power=")
 
         return FULL * power / full
 
-    def _set_origin(self, line: Line) -> None:
+    def _set_origin(self, line: GCodeWords) -> None:
         """G92: what follows counts from another origin; the place stays."""
         x, y = (line.get(letter) for letter in "XY")
         if x is y is None and line.get("Z") is None:
@@ -155,10 +155,10 @@ class Machine:
         wanted = complex(here.real if x is None else x * self.unit, here.imag if y is None else y * self.unit)
         self.origin += here - wanted
 
-    def _move(self, line: Line) -> None:
+    def _move(self, line: GCodeWords) -> None:
         """A way by the motion that holds."""
         if self.motion is None:
-            raise Misfit("axes without G0 to G3 before them")
+            raise GCodeProblem("axes without G0 to G3 before them")
 
         here = self.place - self.origin
         x, y, z = (None if (given := line.get(letter)) is None else given * self.unit for letter in "XYZ")
@@ -194,14 +194,14 @@ class Machine:
 
         self.place = target
 
-    def _arc(self, line: Line, target: complex) -> list[complex]:
+    def _arc(self, line: GCodeWords, target: complex) -> list[complex]:
         """The points of an arc, but for its first one."""
         i, j, _, r = (None if (given := line.get(letter)) is None else given * self.unit for letter in ARC_AXES)
         left = self.motion == 3
         if r is not None:
             centre = centre_of(self.place, target, r, left=left)
         elif i is None and j is None:
-            raise Misfit("an arc needs I and J, or R")
+            raise GCodeProblem("an arc needs I and J, or R")
         elif self.arc_absolute:
             centre = complex(self.place.real if i is None else i, self.place.imag if j is None else j) + self.origin
         else:
@@ -209,7 +209,7 @@ class Machine:
 
         start, end = self.place - centre, target - centre
         if abs(abs(start) - abs(end)) > UNTIDY * max(abs(start), 1.0):
-            raise Misfit(f"the arc's ends are {abs(start):.3f} and {abs(end):.3f} mm from its centre")
+            raise GCodeProblem(f"the arc's ends are {abs(start):.3f} and {abs(end):.3f} mm from its centre")
 
         sweep = math.fmod(cmath.phase(end) - cmath.phase(start), math.tau)
         if target == self.place or sweep == 0:
@@ -224,11 +224,11 @@ def centre_of(start: complex, end: complex, radius: float, *, left: bool) -> com
     """The centre of an arc by its radius; a negative one takes the longer way round."""
     chord = end - start
     if not chord:
-        raise Misfit("an arc by R must end elsewhere than it begins")
+        raise GCodeProblem("an arc by R must end elsewhere than it begins")
 
     square = radius**2 - abs(chord) ** 2 / 4
     if square < -UNTIDY * radius**2:
-        raise Misfit(f"R{radius:g} is too small for ends that are {abs(chord):.3f} mm apart")
+        raise GCodeProblem(f"R{radius:g} is too small for ends that are {abs(chord):.3f} mm apart")
 
     aside = chord / abs(chord) * 1j * math.sqrt(max(0.0, square))
     return (start + end) / 2 + (aside if left == (radius > 0) else -aside)

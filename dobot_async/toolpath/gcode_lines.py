@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-__all__ = ["INCH", "Line", "WrongLine", "lines_of", "low_of", "switched"]
+__all__ = ["INCH", "GCodeWords", "WrongLine", "lines_of", "low_of", "switched"]
 
 LONGEST = 1000  # characters of a line
 WORD = re.compile(r"\s*([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
@@ -16,7 +16,7 @@ INCH = 25.4
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class GCodeWords:
     """One line: its number, and its words in order."""
 
     number: int
@@ -36,7 +36,7 @@ class WrongLine(Exception):
         self.reason = reason
 
 
-def lines_of(text: str) -> Iterator[Line]:
+def lines_of(text: str) -> Iterator[GCodeWords]:
     """The lines that say something, up to the end of the program (M2, M30)."""
     for number, given in enumerate(text.split("\n"), 1):
         if len(given) > LONGEST:
@@ -57,15 +57,15 @@ def lines_of(text: str) -> Iterator[Line]:
             return
 
         if words:
-            yield Line(number, tuple(word for word in words if word[0] != "N"))
+            yield GCodeWords(number, tuple(word for word in words if word[0] != "N"))
 
 
-def switched(program: list[Line]) -> bool:
+def switched(program: list[GCodeWords]) -> bool:
     """Whether a program switches a laser, a spindle or a servo on."""
     return any(letter == "M" and number in {3, 4, 106} for line in program for letter, number in line.words)
 
 
-def low_of(program: list[Line]) -> float | None:
+def low_of(program: list[GCodeWords]) -> float | None:
     """The middle of the heights of a program, mm, None if there is but one."""
     unit, absolute, z = 1.0, True, 0.0
     heights: set[float] = set()

@@ -17,7 +17,7 @@ from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.stroke import Stroke
 from dobot_async.toolpath.toolpath import Toolpath
 
-__all__ = ["SAME", "Kind", "Move", "Reach", "Tool", "approach", "check_moves", "fastest", "from_point", "moves_of"]
+__all__ = ["SAME", "Move", "MoveKind", "Reach", "Tool", "approach", "check_moves", "fastest", "from_point", "moves_of"]
 
 Tool = Literal["pen", "laser"]
 Reach = Callable[[Place], None]
@@ -28,7 +28,7 @@ DOT = 0.1  # mm: how long a dot of a laser is, which must move to burn
 LOOK = 5.0  # mm between two looks at the reach
 
 
-class Kind(Enum):
+class MoveKind(Enum):
     """What a move is for."""
 
     TRAVEL = "travel"
@@ -51,7 +51,7 @@ class Move:
         point: The number of the point in the stroke as it is drawn, to which it leads.
     """
 
-    kind: Kind
+    kind: MoveKind
     place: Place
     power: float
     speed: float
@@ -71,12 +71,12 @@ def moves_of(toolpath: Toolpath, plane: WorkPlane, tool: Tool, speeds: Sequence[
 def pen_moves(stroke: Stroke, number: int, plane: WorkPlane, speed: float) -> Iterator[Move]:
     """Over the start, down, along, and up."""
     powers = stroke.powers
-    yield Move(Kind.TRAVEL, plane.to_arm(*stroke.start, plane.lift), 0.0, speed, number)
-    yield Move(Kind.LOWER, plane.pressed(stroke.start, powers[0]), 0.0, speed, number)
+    yield Move(MoveKind.TRAVEL, plane.to_arm(*stroke.start, plane.lift), 0.0, speed, number)
+    yield Move(MoveKind.LOWER, plane.pressed(stroke.start, powers[0]), 0.0, speed, number)
     for point, (place, power) in enumerate(zip(stroke.points[1:], powers[1:], strict=True), 1):
-        yield Move(Kind.DRAW, plane.pressed(place, power), power, speed, number, point)
+        yield Move(MoveKind.DRAW, plane.pressed(place, power), power, speed, number, point)
 
-    yield Move(Kind.LIFT, plane.to_arm(*stroke.end, plane.lift), 0.0, speed, number, len(powers) - 1)
+    yield Move(MoveKind.LIFT, plane.to_arm(*stroke.end, plane.lift), 0.0, speed, number, len(powers) - 1)
 
 
 def laser_moves(stroke: Stroke, number: int, plane: WorkPlane, speed: float) -> Iterator[Move]:
@@ -85,9 +85,9 @@ def laser_moves(stroke: Stroke, number: int, plane: WorkPlane, speed: float) -> 
     if len(points) == 1:
         points, powers = (points[0], (points[0][0] + DOT, points[0][1])), powers * 2
 
-    yield Move(Kind.JUMP, plane.to_arm(*points[0]), 0.0, speed, number)
+    yield Move(MoveKind.JUMP, plane.to_arm(*points[0]), 0.0, speed, number)
     for point, (place, power) in enumerate(zip(points[1:], powers[1:], strict=True), 1):
-        yield Move(Kind.DRAW, plane.to_arm(*place), power, speed, number, point)
+        yield Move(MoveKind.DRAW, plane.to_arm(*place), power, speed, number, point)
 
 
 def approach(here: Place, moves: Sequence[Move], plane: WorkPlane) -> list[Move]:
@@ -97,11 +97,11 @@ def approach(here: Place, moves: Sequence[Move], plane: WorkPlane) -> list[Move]
     above = plane.to_plane(*first.place)
     found: list[Move] = []
     if at.height < plane.lift - SAME:
-        found.append(replace(first, kind=Kind.TRAVEL, place=plane.to_arm(at.x, at.y, plane.lift)))
+        found.append(replace(first, kind=MoveKind.TRAVEL, place=plane.to_arm(at.x, at.y, plane.lift)))
 
-    if first.kind is Kind.JUMP:
-        found.append(replace(first, kind=Kind.TRAVEL, place=plane.to_arm(above.x, above.y, plane.lift)))
-        found.append(replace(first, kind=Kind.LOWER))
+    if first.kind is MoveKind.JUMP:
+        found.append(replace(first, kind=MoveKind.TRAVEL, place=plane.to_arm(above.x, above.y, plane.lift)))
+        found.append(replace(first, kind=MoveKind.LOWER))
 
     return found
 
@@ -126,7 +126,7 @@ def check_moves(moves: Iterable[Move], reach: Reach, here: Place | None = None) 
             try:
                 reach(place)
             except ValueError as error:
-                way = "" if move.kind is Kind.DRAW else f" ({ON_THE_WAY[move.kind]})"
+                way = "" if move.kind is MoveKind.DRAW else f" ({ON_THE_WAY[move.kind]})"
                 alarm = getattr(error, "alarm", None)
                 named = {} if alarm is None else {"alarm": alarm}
                 raise UnreachableStroke(move.stroke, move.point, place, f"{error}{way}", **named) from None
@@ -135,10 +135,10 @@ def check_moves(moves: Iterable[Move], reach: Reach, here: Place | None = None) 
 
 
 ON_THE_WAY = {
-    Kind.TRAVEL: "on the way to the stroke, above the paper",
-    Kind.LOWER: "where the stroke begins",
-    Kind.JUMP: "on the way to the stroke",
-    Kind.LIFT: "above the paper, where the stroke ends",
+    MoveKind.TRAVEL: "on the way to the stroke, above the paper",
+    MoveKind.LOWER: "where the stroke begins",
+    MoveKind.JUMP: "on the way to the stroke",
+    MoveKind.LIFT: "above the paper, where the stroke ends",
 }
 
 
@@ -161,7 +161,7 @@ def fastest(moves: Sequence[Move], rate: float, depth: int) -> float:
     lengths: list[float] = []
     here: Place | None = None
     for move in moves:
-        if move.kind in {Kind.DRAW, Kind.JUMP} and here is not None:
+        if move.kind in {MoveKind.DRAW, MoveKind.JUMP} and here is not None:
             lengths.append(math.dist(here, move.place))
         else:
             best = min(best, slowest_window(lengths, depth))

@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 from dobot_async._core.queue.motion import Motion
 from dobot_async.arms.magician import commands as m
 from dobot_async.arms.magician.arm import Magician
-from dobot_async.toolpath.moves import SAME, Kind, Move
+from dobot_async.toolpath.moves import SAME, Move, MoveKind
 from dobot_async.toolpath.plane import Place
 
-__all__ = ["Position", "Sent", "Stand", "along", "stand_of"]
+__all__ = ["DrawingStand", "Sent", "StrokePosition", "along", "stand_of"]
 
 NEAR = 0.3  # mm by which an arm may stand beside the way on which it was stopped
 LOOKS = 20
@@ -29,7 +29,7 @@ FINE = 10_000  # parts of a way that are told apart
 PAUSE = 0.02  # seconds between two looks at an arm that comes to rest
 
 
-class Position(NamedTuple):
+class StrokePosition(NamedTuple):
     """Where to go on.
 
     Attributes:
@@ -56,18 +56,22 @@ class Sent(NamedTuple):
     start: Place
     ends: bool
 
-    def passed(self, position: Position) -> Position:
+    def passed(self, position: StrokePosition) -> StrokePosition:
         """Return the position when it is done."""
         if not self.move:
             return position
 
         if self.ends:
-            return max(position, Position(self.move.stroke + 1))
+            return max(position, StrokePosition(self.move.stroke + 1))
 
-        return max(position, Position(self.move.stroke, self.move.point)) if self.move.kind is Kind.DRAW else position
+        return (
+            max(position, StrokePosition(self.move.stroke, self.move.point))
+            if self.move.kind is MoveKind.DRAW
+            else position
+        )
 
 
-class Stand(NamedTuple):
+class DrawingStand(NamedTuple):
     """Where an arm stands after a stop.
 
     Attributes:
@@ -79,14 +83,14 @@ class Stand(NamedTuple):
     place: Place
 
 
-async def of_magician(arm: Magician) -> Stand | None:
+async def of_magician(arm: Magician) -> DrawingStand | None:
     """Where a Magician stands; None if it does not come to rest."""
     before: Place | None = None
     for _ in range(LOOKS):
         pose = await arm.get_pose()
         place = pose.x, pose.y, pose.z
         if before and math.dist(before, place) < SAME:
-            return Stand(await arm.request(m.GET_QUEUED_CMD_CURRENT_INDEX, None), place)
+            return DrawingStand(await arm.request(m.GET_QUEUED_CMD_CURRENT_INDEX, None), place)
 
         before = place
         await asyncio.sleep(PAUSE)
@@ -94,17 +98,17 @@ async def of_magician(arm: Magician) -> Stand | None:
     return None
 
 
-STANDS: Mapping[type, Callable[[Any], Awaitable[Stand | None]]] = {Magician: of_magician}
+STANDS: Mapping[type, Callable[[Any], Awaitable[DrawingStand | None]]] = {Magician: of_magician}
 """The others do one motion at a time, and each is seen to be done before the next one is sent."""
 
 
-async def stand_of(arm: object) -> Stand | None:
+async def stand_of(arm: object) -> DrawingStand | None:
     """Return where an arm stands, None for one that does not tell; it must have been stopped."""
     ask = next((ask for kind, ask in STANDS.items() if isinstance(arm, kind)), None)
     return await ask(arm) if ask else None
 
 
-def along(pending: Iterable[Sent], stand: Stand, position: Position) -> Position:
+def along(pending: Iterable[Sent], stand: DrawingStand, position: StrokePosition) -> StrokePosition:
     """Return the position of an arm that was stopped: the one before if index and place do not agree.
 
     Args:
@@ -126,21 +130,21 @@ def along(pending: Iterable[Sent], stand: Stand, position: Position) -> Position
     return position
 
 
-def stopped_on(sent: Sent, share: float, position: Position) -> Position:
+def stopped_on(sent: Sent, share: float, position: StrokePosition) -> StrokePosition:
     """The position of an arm that was stopped on a way, of which a share lies behind it."""
     move = sent.move
     if not move:
         return position
 
-    if move.kind is Kind.LIFT or share >= 1:  # which begins when all of the stroke is drawn
+    if move.kind is MoveKind.LIFT or share >= 1:  # which begins when all of the stroke is drawn
         return sent.passed(position)
 
-    if move.kind is not Kind.DRAW:
+    if move.kind is not MoveKind.DRAW:
         return position
 
     # A way on which it had been stopped before begins there.
-    start = max(position, Position(move.stroke, move.point - 1)).point
-    return Position(move.stroke, math.floor((start + share * (move.point - start)) * FINE) / FINE)
+    start = max(position, StrokePosition(move.stroke, move.point - 1)).point
+    return StrokePosition(move.stroke, math.floor((start + share * (move.point - start)) * FINE) / FINE)
 
 
 def share_of(sent: Sent, place: Place) -> float | None:

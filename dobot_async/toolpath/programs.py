@@ -25,10 +25,10 @@ from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.ultraarm import commands as u
 from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import UnsupportedError
-from dobot_async.toolpath.moves import Kind, Move, Tool
+from dobot_async.toolpath.moves import Move, MoveKind, Tool
 from dobot_async.toolpath.plane import Place
 
-__all__ = ["Instruction", "Pace", "Program", "program_for"]
+__all__ = ["DrawingPace", "DrawingProgram", "Instruction", "program_for"]
 
 SLOWEST, FASTEST = 1.0, 200.0  # mm/s of an ultraArm
 SAFE_PERCENT = 20
@@ -43,7 +43,7 @@ class Instruction(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class DrawingPace:
     """How fast, beside the speed along strokes.
 
     Attributes:
@@ -55,7 +55,7 @@ class Pace:
     percent: int = SAFE_PERCENT
 
 
-class Program(Protocol):
+class DrawingProgram(Protocol):
     """A family's way to say moves."""
 
     def instructions(self, moves: Iterable[Move]) -> Iterator[Instruction]:
@@ -73,7 +73,7 @@ class MagicianProgram:
         pace: The acceleration.
     """
 
-    def __init__(self, kinematics: Kinematics, j4: float, tool: Tool, pace: Pace) -> None:
+    def __init__(self, kinematics: Kinematics, j4: float, tool: Tool, pace: DrawingPace) -> None:
         self._kinematics = kinematics
         self._j4 = j4
         self._laser = tool == "laser"
@@ -93,10 +93,10 @@ class MagicianProgram:
             yield Instruction(m.SET_END_EFFECTOR_LASER, m.EndEffectorLaser(False, False), None)
 
     def _instruction(self, move: Move) -> Instruction:
-        if self._laser and move.kind in {Kind.DRAW, Kind.JUMP}:
+        if self._laser and move.kind in {MoveKind.DRAW, MoveKind.JUMP}:
             return Instruction(m.SET_CPLE_CMD, m.CPLECmd(m.CPMode.ABSOLUTE, *move.place, move.power), move)
 
-        if move.kind is Kind.DRAW:
+        if move.kind is MoveKind.DRAW:
             return Instruction(m.SET_CP_CMD, m.CPCmd(m.CPMode.ABSOLUTE, *move.place), move)
 
         return Instruction(m.SET_PTP_CMD, m.PTPCmd(m.PTPMode.MOVL_XYZ, *move.place, self._rotation(move.place)), move)
@@ -140,7 +140,7 @@ class UltraArmProgram:
 class CobotProgram:
     """SendCoords along straight lines."""
 
-    def __init__(self, rotation: tuple[float, ...], pace: Pace) -> None:
+    def __init__(self, rotation: tuple[float, ...], pace: DrawingPace) -> None:
         self._rotation = rotation
         self._percent = pace.percent
 
@@ -151,26 +151,26 @@ class CobotProgram:
             yield Instruction(b.SEND_COORDS, b.ToMove(coords, self._percent, b.MoveMode.LINEAR), move)
 
 
-async def of_magician(arm: Magician, tool: Tool, pace: Pace) -> tuple[Place, Program]:
+async def of_magician(arm: Magician, tool: Tool, pace: DrawingPace) -> tuple[Place, DrawingProgram]:
     """Where a Magician is, and how it is told."""
     pose = await arm.get_pose()
     return (pose.x, pose.y, pose.z), MagicianProgram(arm.kinematics, pose.j4, tool, pace)
 
 
-async def of_ultraarm(arm: UltraArm, tool: Tool, _: Pace) -> tuple[Place, Program]:
+async def of_ultraarm(arm: UltraArm, tool: Tool, _: DrawingPace) -> tuple[Place, DrawingProgram]:
     """Where an ultraArm is, and how it is told."""
     coords = await arm.request(u.GET_COORDS, None)
     return (coords.x, coords.y, coords.z), UltraArmProgram(tool)
 
 
-async def of_cobot(arm: MyCobot, _: Tool, pace: Pace) -> tuple[Place, Program]:
+async def of_cobot(arm: MyCobot, _: Tool, pace: DrawingPace) -> tuple[Place, DrawingProgram]:
     """Where a myCobot is, and how it is told."""
     coords = await arm.request(b.GET_COORDS, None)
     x, y, z, *rotation = (float(number) for number in coords)
     return (x, y, z), CobotProgram(tuple(rotation), pace)
 
 
-FAMILIES: Mapping[type, Callable[[Any, Tool, Pace], Any]] = {
+FAMILIES: Mapping[type, Callable[[Any, Tool, DrawingPace], Any]] = {
     Magician: of_magician,
     UltraArm: of_ultraarm,
     MyCobot: of_cobot,
@@ -186,7 +186,7 @@ def check_tool(arm: object, tool: Tool) -> None:
         raise UnsupportedError(f"a {arm.model.title} has no laser: its protocol has no command for one")
 
 
-async def program_for(arm: object, tool: Tool, pace: Pace) -> tuple[Place, Program]:
+async def program_for(arm: object, tool: Tool, pace: DrawingPace) -> tuple[Place, DrawingProgram]:
     """Return where an arm is, and its way to say moves."""
     make = next(make for kind, make in FAMILIES.items() if isinstance(arm, kind))
     here, program = await make(arm, tool, pace)

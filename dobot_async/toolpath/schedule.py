@@ -8,9 +8,9 @@ from itertools import islice, pairwise
 from typing import Any, SupportsFloat
 
 from dobot_async._core.util.arguments import check_duration, to_float
-from dobot_async.toolpath.moves import Kind, Move, Tool, fastest, moves_of
+from dobot_async.toolpath.moves import Move, MoveKind, Tool, fastest, moves_of
 from dobot_async.toolpath.plane import WorkPlane
-from dobot_async.toolpath.position import Position
+from dobot_async.toolpath.position import StrokePosition
 from dobot_async.toolpath.programs import Instruction
 from dobot_async.toolpath.toolpath import Toolpath
 
@@ -61,7 +61,7 @@ def batches(instructions: Sequence[Instruction]) -> Iterator[list[tuple[Instruct
     ends = [False] * len(instructions)
     last: dict[int, int] = {}
     for number, each in enumerate(instructions):
-        if each.move and each.move.kind in {Kind.DRAW, Kind.LIFT}:
+        if each.move and each.move.kind in {MoveKind.DRAW, MoveKind.LIFT}:
             last[each.move.stroke] = number
 
     for number in (*last.values(), len(instructions) - 1):
@@ -76,7 +76,7 @@ def guess(moves: Sequence[Move]) -> float:
     """About how many seconds a stroke takes."""
     ways = pairwise(moves)
     along = sum(math.dist(a.place, b.place) / b.speed for a, b in ways)
-    return along + PER_MOVE * sum(move.kind is not Kind.DRAW for move in moves)
+    return along + PER_MOVE * sum(move.kind is not MoveKind.DRAW for move in moves)
 
 
 def above_zero(value: SupportsFloat, name: str) -> float:
@@ -96,7 +96,7 @@ def whole_percent(value: Any) -> int:
     return int(value)
 
 
-def position_in(strokes: Sequence[Sequence[Move]], stroke: Any, point: SupportsFloat, tool: Tool) -> Position:
+def position_in(strokes: Sequence[Sequence[Move]], stroke: Any, point: SupportsFloat, tool: Tool) -> StrokePosition:
     """The place where to begin, checked."""
     if not hasattr(stroke, "__index__"):
         raise TypeError(f"first must be the number of a stroke, not {stroke!r}")
@@ -114,4 +114,4 @@ def position_in(strokes: Sequence[Sequence[Move]], stroke: Any, point: SupportsF
     if not 0 <= found <= last or (found == last and found):
         raise ValueError(f"point must be 0 or above and below {last}, the last point of stroke {stroke}, not {point!r}")
 
-    return Position(stroke.__index__(), found)
+    return StrokePosition(stroke.__index__(), found)

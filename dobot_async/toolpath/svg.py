@@ -14,7 +14,7 @@ from dobot_async.toolpath import curves
 from dobot_async.toolpath.errors import ToolpathFileError, library
 from dobot_async.toolpath.sources import FINE, Source, check_tolerance, content, name_of
 from dobot_async.toolpath.stroke import Matrix, Stroke
-from dobot_async.toolpath.svg_checks import Misfit
+from dobot_async.toolpath.svg_checks import SVGProblem
 from dobot_async.toolpath.svg_tree import parse_tree, plain
 from dobot_async.toolpath.toolpath import Toolpath
 
@@ -57,8 +57,8 @@ def read_svg(source: Source, *, tolerance: float = FINE) -> Toolpath:
                         for points in outlines(shape, svgelements, tolerance / MM)
                     ]
                 except (ValueError, ZeroDivisionError, OverflowError) as error:
-                    raise Misfit(int(shape.values.get("data-line", 0)), str(error)) from error
-    except Misfit as error:
+                    raise SVGProblem(int(shape.values.get("data-line", 0)), str(error)) from error
+    except SVGProblem as error:
         raise ToolpathFileError(name, f"line {error.line}", error.reason) from None
     except (ValueError, ZeroDivisionError, OverflowError, TypeError, AttributeError, IndexError) as error:
         raise ToolpathFileError(name, "", f"svgelements cannot read it: {error}") from error

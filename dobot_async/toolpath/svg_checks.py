@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-__all__ = ["NUMBER", "SHAPES", "Misfit", "Node", "check", "length", "numbers_of"]
+__all__ = ["NUMBER", "SHAPES", "Node", "SVGProblem", "check", "length", "numbers_of"]
 
 SHAPES = frozenset({"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"})
 PX = {"": 1.0, "px": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 960 / 25.4, "pt": 96 / 72, "pc": 16.0, "q": 96 / 101.6}
@@ -23,7 +23,7 @@ NO_START = "data that does not begin with M"
 ARGUMENTS = {"m": 2, "z": 0, "l": 2, "h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "t": 2, "a": 7}
 
 
-class Misfit(Exception):
+class SVGProblem(Exception):
     """What is wrong, and in which line."""
 
     def __init__(self, line: int, reason: str) -> None:
@@ -57,7 +57,9 @@ def length(node: Node, name: str, value: str, whole: float) -> float:
         return float(match[1]) / 100 * whole
 
     if match is None or unit not in PX or not math.isfinite(float(match[1])):
-        raise Misfit(node.line, f"<{node.tag}>: {name}={value!r} is no length (of {', '.join(filter(None, PX))} or %)")
+        raise SVGProblem(
+            node.line, f"<{node.tag}>: {name}={value!r} is no length (of {', '.join(filter(None, PX))} or %)"
+        )
 
     return float(match[1]) * PX[unit]
 
@@ -67,7 +69,7 @@ def numbers_of(node: Node, name: str, count: int) -> list[float]:
     value = node.attributes[name]
     found = [float(number) for number in re.findall(NUMBER, value)]
     if not NUMBERS.fullmatch(value) or len(found) != count or not all(map(math.isfinite, found)):
-        raise Misfit(node.line, f"<{node.tag}>: {name}={value!r} must be {count} numbers")
+        raise SVGProblem(node.line, f"<{node.tag}>: {name}={value!r} must be {count} numbers")
 
     return found
 
@@ -82,14 +84,14 @@ def check(node: Node) -> None:
 def check_transform(node: Node, value: str) -> None:
     """Known functions with numbers."""
     if not TRANSFORM.fullmatch(value):
-        raise Misfit(node.line, f"<{node.tag}>: transform={value!r} is not understood")
+        raise SVGProblem(node.line, f"<{node.tag}>: transform={value!r} is not understood")
 
 
 def check_points(node: Node, value: str) -> None:
     """Pairs of numbers."""
     count = len(re.findall(NUMBER, value))
     if not NUMBERS.fullmatch(value) or count % 2:
-        raise Misfit(node.line, f"<{node.tag}>: points must be pairs of numbers, not {shortened(value)}")
+        raise SVGProblem(node.line, f"<{node.tag}>: points must be pairs of numbers, not {shortened(value)}")
 
 
 def check_data(node: Node, value: str) -> None:
@@ -119,10 +121,10 @@ def check_data(node: Node, value: str) -> None:
         raise data_misfit(node, value, place, wrong)
 
 
-def data_misfit(node: Node, value: str, place: int, wrong: str) -> Misfit:
+def data_misfit(node: Node, value: str, place: int, wrong: str) -> SVGProblem:
     """What to raise for path data."""
     rest = shortened(value[place:]) if value[place:].strip() else "the end"
-    return Misfit(node.line, f"<path>: {wrong} at character {place + 1} of its data: {rest}")
+    return SVGProblem(node.line, f"<path>: {wrong} at character {place + 1} of its data: {rest}")
 
 
 def lacking(letter: str, count: int) -> str:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
-from dobot_async.toolpath.svg_checks import SHAPES, Misfit, Node, check, length, numbers_of
+from dobot_async.toolpath.svg_checks import SHAPES, Node, SVGProblem, check, length, numbers_of
 
 __all__ = ["parse_tree", "plain"]
 
@@ -38,7 +38,7 @@ def parse_tree(data: bytes) -> Node:
     def start(name: str, attributes: Mapping[str, str]) -> None:
         space, _, tag = name.rpartition("}")
         if len(stack) > DEEPEST:
-            raise Misfit(parser.CurrentLineNumber, f"more than {DEEPEST} elements inside of one another")
+            raise SVGProblem(parser.CurrentLineNumber, f"more than {DEEPEST} elements inside of one another")
 
         found = {key.rpartition("}")[2]: value for key, value in attributes.items() if key.rpartition("}")[2] == key}
         found |= {key.rpartition("}")[2]: value for key, value in attributes.items() if "}" in key}
@@ -57,14 +57,14 @@ def parse_tree(data: bytes) -> Node:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
-        raise Misfit(error.lineno, f"this is no XML: {reason} (column {error.offset + 1})") from None
+        raise SVGProblem(error.lineno, f"this is no XML: {reason} (column {error.offset + 1})") from None
 
     except (LookupError, ValueError) as error:
-        raise Misfit(1, f"its encoding is not known: {error}") from None
+        raise SVGProblem(1, f"its encoding is not known: {error}") from None
 
     root = stack[0].children[0]
     if root.tag != "svg":
-        raise Misfit(root.line, f"this is no SVG: its root is <{root.tag.removeprefix('other-')}>")
+        raise SVGProblem(root.line, f"this is no SVG: its root is <{root.tag.removeprefix('other-')}>")
 
     return root
 
@@ -84,7 +84,7 @@ class Viewport:
         return self.height if name in ALONG_Y else math.hypot(self.width, self.height) / math.sqrt(2)
 
 
-class Writer:
+class SVGWriter:
     """Writes what is drawn of a tree as SVG of groups and shapes in px, y down.
 
     Attributes:
@@ -121,7 +121,7 @@ class Writer:
 
         self._count += 1
         if self._count > MOST or len(using) > DEEPEST:
-            raise Misfit(node.line, "more elements than a drawing has, once every <use> is written out")
+            raise SVGProblem(node.line, "more elements than a drawing has, once every <use> is written out")
 
         check(node)
         if node.tag in SHAPES:
@@ -153,10 +153,12 @@ class Writer:
         name = node.attributes.get("href", "").removeprefix("#")
         target = self._named.get(name)
         if target is None:
-            raise Misfit(node.line, f"<use> of {node.attributes.get('href', 'nothing')!r}, which is not in the file")
+            raise SVGProblem(
+                node.line, f"<use> of {node.attributes.get('href', 'nothing')!r}, which is not in the file"
+            )
 
         if name in using:
-            raise Misfit(node.line, f"<use> of {name!r}, which uses itself")
+            raise SVGProblem(node.line, f"<use> of {name!r}, which uses itself")
 
         self._open(node, translate=(self._measure(node, "x", view), self._measure(node, "y", view)))
         if target.tag in {"symbol", "svg"}:
@@ -177,7 +179,7 @@ class Writer:
         if "viewBox" in node.attributes:
             left, top, width, height = numbers_of(node, "viewBox", 4)
             if width <= 0 or height <= 0:
-                raise Misfit(node.line, "viewBox: width and height must be above 0")
+                raise SVGProblem(node.line, "viewBox: width and height must be above 0")
 
             inner = Viewport(width, height)
             transform = fitted(node.attributes.get("preserveAspectRatio", ""), size, (left, top), inner)
@@ -211,7 +213,7 @@ class Writer:
 
 def plain(root: Node) -> tuple[str, float]:
     """Return what is drawn as plain SVG in px, and the height of the page in px; raise Misfit where it is broken."""
-    writer = Writer(root)
+    writer = SVGWriter(root)
     return writer.write(), writer.height
 
 

@@ -16,7 +16,7 @@ from virtual_ports import on_the_virtual_clock, virtual_ports
 from dobot_async import MotionStopped, MyCobot
 from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.protocol.wire import Command
-from dobot_async.arms.bridge_adapter import Kind
+from dobot_async.arms.bridge_adapter import RequestKind
 from dobot_async.arms.mycobot import commands as c
 from dobot_async.arms.mycobot import frame as f
 from dobot_async.arms.mycobot.bridge_adapter import BRIDGED, CobotWatch
@@ -288,7 +288,9 @@ def test_a_row_is_what_the_table_says(model: Any) -> None:
     for row, own in model.rows.items():
         stops = row in {c.STOP, c.JOG_STOP}
         each = f.Frame(own.id, b"")
-        assert family.kind(each) is (Kind.STOP if stops else Kind.WRITE if row.write else Kind.READ)
+        assert family.kind(each) is (
+            RequestKind.STOP if stops else RequestKind.WRITE if row.write else RequestKind.READ
+        )
         assert family.name(each) == own.name
         assert family.repeatable(each) is not row.write
         assert family.may_be_silent(each) is row.write

@@ -20,7 +20,7 @@ from dobot_async import Magician
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import encode
 from dobot_async.bridge import Limits
-from dobot_async.bridge.doors import Doors
+from dobot_async.bridge.doors import Listeners
 from dobot_async.bridge.handshake import PENDING
 
 GET_POSE = encode(ask(c.GET_POSE))
@@ -58,4 +58,4 @@ def test_a_key_with_a_password_is_refused_and_nobody_is_asked_for_it(tmp_path: P
     pem = tmp_path / "key.pem"
     pem.write_bytes(key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, secret) + issued.cert_chain_pems[0].bytes())
     with pytest.raises(ValueError, match="cannot use the certificate"):
-        Doors.of([TCP], None, pem, None, ())
+        Listeners.of([TCP], None, pem, None, ())

@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from dobot_async import ConnectFailed, Magician, open_transport
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import Parser, encode
-from dobot_async.bridge.doors import Doors
+from dobot_async.bridge.doors import Listeners
 
 TOKEN = "geheim-4711"
 PLACES = ["tcp://127.0.0.1:0", "udp://127.0.0.1:0", "ws://127.0.0.1:0"]
@@ -189,14 +189,14 @@ async def test_what_a_browser_posts_to_a_port_does_not_reach_the_arm(first: byte
     ],
 )
 def test_a_token_is_made_up_where_others_can_come(listen: str, needed: bool) -> None:
-    token = Doors.of(["pty", listen], None, None, None, ()).token
+    token = Listeners.of(["pty", listen], None, None, None, ()).token
     assert (token is not None) == needed
     assert len(token or "x" * 32) >= 32
-    assert Doors.of(["pty", listen], "mine", None, None, ()).token == "mine"
+    assert Listeners.of(["pty", listen], "mine", None, None, ()).token == "mine"
 
 
 def test_a_made_up_token_is_another_one_each_time() -> None:
-    assert len({Doors.of(["ws://[::]:0"], None, None, None, ()).token for _ in range(10)}) == 10
+    assert len({Listeners.of(["ws://[::]:0"], None, None, None, ()).token for _ in range(10)}) == 10
 
 
 async def test_tls() -> None:

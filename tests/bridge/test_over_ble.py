@@ -19,7 +19,7 @@ from dobot_async.simulator import Simulation, simulate
 if sys.platform != "linux":
     pytest.skip("BlueZ is Linux's", allow_module_level=True)
 
-from dobot_async.simulator.ble.link_layer import Radio
+from dobot_async.simulator.ble.link_layer import RadioSettings
 from dobot_async.simulator.ble.testbed import rig
 
 if not shutil.which("dbus-daemon") and not os.environ.get("DOBOT_REQUIRE_DBUS"):
@@ -32,7 +32,7 @@ WS = "ws://127.0.0.1:0"
 async def sim() -> AsyncIterator[Simulation]:
     """An arm with a BLE module, on a good connection."""
     async with rig() as world, simulate(speed=5) as simulation:
-        world.add(simulation, Radio(interval=0.0075, advertising=0.02))
+        world.add(simulation, RadioSettings(interval=0.0075, advertising=0.02))
         yield simulation
 
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from dobot_async.arms.bridge_adapter import Switch, Watch
+from dobot_async.arms.bridge_adapter import ClientWatch, Switch
 from dobot_async.arms.magician import bridge_adapter as magician
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import Frame, Parser, request
 from dobot_async.arms.ultraarm import bridge_adapter as ultraarm
-from dobot_async.arms.ultraarm.bridge_lines import Line
+from dobot_async.arms.ultraarm.bridge_lines import BridgedLine
 from dobot_async.arms.ultraarm.frame import END
 from dobot_async.simulator import SimulatedMagician, SimulatedUltraArm, UltraArmQuirks
 
@@ -60,7 +60,7 @@ class Bench:
     def __init__(self) -> None:
         self.clock = Clock()
         self.arm = SimulatedMagician(self.clock)
-        self.watch: Watch[Frame] = magician.BRIDGED.watch()
+        self.watch: ClientWatch[Frame] = magician.BRIDGED.watch()
 
     def ask(self, each: Frame) -> Frame | None:
         found = Parser().feed(self.arm.answer(each))
@@ -139,13 +139,13 @@ def test_the_laser_of_an_ultraarm_is_off_when_its_program_is_gone(jog_stop: Any)
         arm = SimulatedUltraArm(clock, quirks=UltraArmQuirks(jog_stop=jog_stop))
         watch = ultraarm.UltraArmWatch(clock)
         for word in order:
-            line = Line(word.encode() + END)
+            line = BridgedLine(word.encode() + END)
             watch.sent(line)
             arm.answer(line.text)
             watch.answered(line, line)
 
         clock.now += LATER  # whatever moves has come to rest
-        rest = Line(b"DATA: Moving end\r\nQUEUE SIZE[0]\r\nENDSTOP[0 ,0 ,0]\r\nCOORDS[0 ,0 ,0 ,0]\r\n")
+        rest = BridgedLine(b"DATA: Moving end\r\nQUEUE SIZE[0]\r\nENDSTOP[0 ,0 ,0]\r\nCOORDS[0 ,0 ,0 ,0]\r\n")
         assert not arm.device.moving
         if not watch.moving(rest):
             assert not arm.registers.laser, order

@@ -17,8 +17,8 @@ from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import encode
 from dobot_async.bridge import Limits
 from dobot_async.transports import open_transport
-from dobot_async.transports.zenoh.config import Place
-from dobot_async.transports.zenoh.session import Session
+from dobot_async.transports.zenoh.config import ZenohConfig
+from dobot_async.transports.zenoh.session import ZenohSession
 
 BUFFERS = {"so_sndbuf": 4096, "so_rcvbuf": 4096}
 MANY = Limits(frames=1e6, data=1e7)
@@ -170,7 +170,7 @@ async def test_a_program_ends_in_time_whose_server_is_frozen_and_reads_nothing(t
 
 async def test_what_a_closed_session_still_hears_arrives_nowhere() -> None:
     heard: list[str] = []
-    session = Session(Place("left"))
+    session = ZenohSession(ZenohConfig("left"))
     await session.open(lambda _: None)
     handler = session.crossing.to(heard.append, str)
     handler.callback("before")

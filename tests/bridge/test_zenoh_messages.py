@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dobot_async.transports.zenoh import messages as zenoh_messages
-from dobot_async.transports.zenoh.messages import DATA, END, HEADER, MESSAGE, MOST, Lost, Numbered, Outbox
+from dobot_async.transports.zenoh.messages import DATA, END, HEADER, MESSAGE, MOST, Lost, Numbered, SendQueue
 
 
 @given(st.lists(st.binary(max_size=8), min_size=1), st.data())
@@ -56,8 +56,8 @@ class Network:
         self.open.wait()
         self.taken.append(message)
 
-    def outbox(self) -> Outbox:
-        return Outbox(self.put, self.complaints.append, "test")
+    def outbox(self) -> SendQueue:
+        return SendQueue(self.put, self.complaints.append, "test")
 
     def read(self) -> tuple[bytes, list[str]]:
         """The bytes that came out, and the last words."""
@@ -140,7 +140,7 @@ async def test_a_session_that_is_closed_is_complained_of() -> None:
         raise zenoh.ZError("session closed at /zenoh/src/session.rs:1")
 
     complaints: list[str] = []
-    outbox = Outbox(closed, complaints.append, "test")
+    outbox = SendQueue(closed, complaints.append, "test")
     outbox.send(b"x")
     await until(lambda: complaints)
     await outbox.aclose()
@@ -153,7 +153,7 @@ async def test_a_bug_in_what_sends_leaves_nobody_waiting() -> None:
         raise ZeroDivisionError
 
     complaints: list[str] = []
-    outbox = Outbox(wrong, complaints.append, "test")
+    outbox = SendQueue(wrong, complaints.append, "test")
     outbox.send(b"x")
     await until(lambda: complaints)
     await outbox.aclose()

@@ -8,15 +8,15 @@ import pytest
 
 from dobot_async import DobotError, MotionStopped
 from dobot_async.fleet import ZoneDeadlock, ZoneOccupied
-from dobot_async.fleet.claims import Claim, Claims, Party, Pause
+from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
 
 
-class Asked(Claim):
+class Asked(ZoneRequest):
     """A claim that keeps its answer."""
 
     __slots__ = ("told",)
 
-    def __init__(self, party: Party, zones: Iterable[str], *others: Party, patient: bool = True) -> None:
+    def __init__(self, party: ZoneHolder, zones: Iterable[str], *others: ZoneHolder, patient: bool = True) -> None:
         self.told: list[DobotError | None] = []
         super().__init__(party, frozenset([party, *others]), frozenset(zones), self.told.append, patient)
 
@@ -25,17 +25,17 @@ class Asked(Claim):
         return self.told == [None]
 
 
-def ask(claims: Claims, party: Party, zones: str, *others: Party, patient: bool = True) -> Asked:
+def ask(claims: ZoneLocks, party: ZoneHolder, zones: str, *others: ZoneHolder, patient: bool = True) -> Asked:
     claim = Asked(party, zones, *others, patient=patient)
     claims.request(claim)
     return claim
 
 
-LEFT, RIGHT, MIDDLE = Party("left"), Party("right"), Party("middle")
+LEFT, RIGHT, MIDDLE = ZoneHolder("left"), ZoneHolder("right"), ZoneHolder("middle")
 
 
 def test_a_cycle_names_its_parties_and_zones() -> None:
-    claims = Claims()
+    claims = ZoneLocks()
     ask(claims, LEFT, "A")
     ask(claims, RIGHT, "B")
     ask(claims, MIDDLE, "C")
@@ -49,7 +49,7 @@ def test_a_cycle_names_its_parties_and_zones() -> None:
 
 
 def test_first_come_first_served() -> None:
-    claims = Claims()
+    claims = ZoneLocks()
     held = ask(claims, LEFT, "A")
     first, second = ask(claims, RIGHT, "AB"), ask(claims, MIDDLE, "B")
     assert not second.told, "B is free, but right was before"
@@ -61,7 +61,7 @@ def test_first_come_first_served() -> None:
 
 
 def test_who_is_waited_for_may_pass() -> None:
-    claims = Claims()
+    claims = ZoneLocks()
     ask(claims, LEFT, "A")
     right = ask(claims, RIGHT, "AB")
     assert ask(claims, LEFT, "B").granted, "right waits for left anyway"
@@ -69,7 +69,7 @@ def test_who_is_waited_for_may_pass() -> None:
 
 
 def test_an_impatient_claim_is_refused_at_once() -> None:
-    claims = Claims()
+    claims = ZoneLocks()
     ask(claims, LEFT, "A")
     refused = ask(claims, RIGHT, "AB", patient=False)
     with pytest.raises(ZoneOccupied, match="right may not pass: left holds zone A"):
@@ -79,15 +79,15 @@ def test_an_impatient_claim_is_refused_at_once() -> None:
 
 
 def test_a_party_acts_for_others() -> None:
-    claims = Claims()
+    claims = ZoneLocks()
     ask(claims, LEFT, "A")
     assert ask(claims, MIDDLE, "A", LEFT).granted
     assert not ask(claims, RIGHT, "A", LEFT).told, "middle has it as well"
 
 
 def test_a_holder_that_has_failed_is_not_waited_for() -> None:
-    claims = Claims()
-    broken = Party("broken")
+    claims = ZoneLocks()
+    broken = ZoneHolder("broken")
     ask(claims, broken, "A")
     waiting = ask(claims, LEFT, "A")
     broken.failure = MotionStopped("an alarm")
@@ -98,17 +98,17 @@ def test_a_holder_that_has_failed_is_not_waited_for() -> None:
 
 
 def test_who_only_may_be_in_a_zone_beside_another_waits() -> None:
-    claims, left = Claims(), Party("left")
+    claims, left = ZoneLocks(), ZoneHolder("left")
     for party in (left, RIGHT):
-        claims.take(Claim(party, frozenset([party]), frozenset("A")))
+        claims.take(ZoneRequest(party, frozenset([party]), frozenset("A")))
 
     assert not ask(claims, left, "A").told
 
 
 def test_who_is_in_a_zone_beside_another_may_move_out() -> None:
-    claims, left = Claims(), Party("left", inside=frozenset("A"))
+    claims, left = ZoneLocks(), ZoneHolder("left", inside=frozenset("A"))
     for party in (left, RIGHT):
-        claims.take(Claim(party, frozenset([party]), frozenset("A")))
+        claims.take(ZoneRequest(party, frozenset([party]), frozenset("A")))
 
     assert claims.holders("A") == [left, RIGHT]
     assert ask(claims, left, "AB").granted
@@ -116,7 +116,7 @@ def test_who_is_in_a_zone_beside_another_may_move_out() -> None:
 
 
 def test_parts_are_released() -> None:
-    claims = Claims()
+    claims = ZoneLocks()
     both = ask(claims, LEFT, "AB")
     waiting = ask(claims, RIGHT, "A")
     claims.keep([both], frozenset("B"))
@@ -126,8 +126,8 @@ def test_parts_are_released() -> None:
 
 def test_what_a_party_leaves_with_several_claims_it_leaves_at_once() -> None:
     moving = True
-    arm = Party("arm", moving=lambda: moving)
-    claims = Claims()
+    arm = ZoneHolder("arm", moving=lambda: moving)
+    claims = ZoneLocks()
     held = [ask(claims, arm, "A"), ask(claims, arm, "A")]
     ask(claims, RIGHT, "B")
     own, other = ask(claims, arm, "B"), ask(claims, RIGHT, "A")
@@ -139,8 +139,8 @@ def test_what_a_party_leaves_with_several_claims_it_leaves_at_once() -> None:
 
 def test_an_arm_that_moves_may_leave_a_zone_by_itself() -> None:
     moving = True
-    arm = Party("arm", moving=lambda: moving)
-    claims = Claims()
+    arm = ZoneHolder("arm", moving=lambda: moving)
+    claims = ZoneLocks()
     for party, zone in ((arm, "A"), (RIGHT, "B")):
         ask(claims, party, zone)
 
@@ -154,16 +154,16 @@ def test_an_arm_that_moves_may_leave_a_zone_by_itself() -> None:
 
 
 def test_a_claim_passes_one_that_waits_at_a_barrier_for_who_asks() -> None:
-    claims = Claims()
+    claims = ZoneLocks()
     ask(claims, LEFT, "A")
     earlier = ask(claims, MIDDLE, "AB")
-    with claims.pausing(Pause("at a barrier for", LEFT, frozenset([LEFT]), lambda: [RIGHT])):
+    with claims.pausing(ProgramWait("at a barrier for", LEFT, frozenset([LEFT]), lambda: [RIGHT])):
         assert ask(claims, RIGHT, "B").granted
         assert not earlier.told
 
 
 def test_waiting_can_be_ended() -> None:
-    claims = Claims()
+    claims = ZoneLocks()
     ask(claims, LEFT, "A")
     acting, own = ask(claims, MIDDLE, "A", RIGHT), ask(claims, RIGHT, "A")
     error = MotionStopped("enough")

@@ -16,7 +16,7 @@ from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BarrierBroken, Member
 from dobot_async.fleet.fleet import OnFailure
 from dobot_async.fleet.guard import Mode
-from dobot_async.fleet.seat import Seat
+from dobot_async.fleet.seat import FleetArm
 from dobot_async.simulator import Faults, Simulation, simulate
 
 NEAR, FAR, TOO_FAR = (220.0, 0.0, 40.0), (240.0, 60.0, 60.0), (400.0, 0.0, 40.0)
@@ -292,16 +292,16 @@ async def test_a_lost_link_is_noticed_although_nobody_asks() -> None:
 
 @virtual
 async def test_a_link_that_is_lost_before_its_arm_has_its_seat_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    begin = Seat.begin
+    begin = FleetArm.begin
 
-    async def begin_too_late(seat: Seat, arm: Arm, options: Mapping[str, Any]) -> None:
+    async def begin_too_late(seat: FleetArm, arm: Arm, options: Mapping[str, Any]) -> None:
         if seat.name == "left":
             sims["left"].unplug()
             await anext(aiter(arm.link.state))
 
         await begin(seat, arm, options)
 
-    monkeypatch.setattr(Seat, "begin", begin_too_late)
+    monkeypatch.setattr(FleetArm, "begin", begin_too_late)
     async with cell("left", "right") as sims, Fleet.connect(urls(sims)) as fleet:
         assert isinstance(fleet.failures["left"], ConnectionLost)
         with pytest.raises(MotionStopped, match="left"):

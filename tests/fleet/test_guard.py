@@ -53,6 +53,11 @@ def inside(sim: Simulation, box: Box = BIN) -> bool:
     return box.contains(*place)
 
 
+def was_told(sim: Simulation) -> bool:
+    """Whether an arm was told of a motion."""
+    return sim.arm.device.moving or any(each.command is c.SET_PTP_CMD for each in sim.arm.executed)
+
+
 async def left_behind(sim: Simulation) -> None:
     """What an earlier program leaves in an arm's queue: it waits, goes into the bin, and stays there for a while."""
     async with Magician.connect(sim.url) as arm:
@@ -196,6 +201,29 @@ async def test_the_ways_behind_a_queued_tool_are_those_of_the_tool() -> None:
             await motion
 
         assert sims["a"].arm.state.get(c.SET_END_EFFECTOR_PARAMS) != LONGER, "nothing of it was sent"
+
+
+@virtual
+async def test_a_tool_that_is_queued_behind_a_motion_is_put_on_wherever_an_alarm_ends_that() -> None:
+    async with cell(at={"a": (225, 0, 40), "b": IN}, speed=1) as (fleet, sims):
+
+        async def change() -> None:
+            async with fleet["a"].queue.batch() as batch:
+                batch.move_to(*OUT)
+                batch.put(c.SET_END_EFFECTOR_PARAMS, LONGER)
+
+        changing = asyncio.create_task(change())
+        await asyncio.sleep(1)
+        assert not was_told(sims["a"])
+        await fleet["b"].move_to(*ASIDE)
+        await changing
+        sims["a"].arm.raise_alarm(0x40)
+        with pytest.raises(ArmAlarm):
+            await fleet["a"].queue.join()
+
+        await asyncio.sleep(1)
+        assert inside(sims["a"])
+        assert fleet.holders("bin") == ["a"]
 
 
 @virtual

@@ -23,7 +23,7 @@ from waits import Scene, Wait, named
 
 from dobot_async import DobotError, MotionStopped
 from dobot_async.fleet import ZoneDeadlock, ZoneOccupied
-from dobot_async.fleet.claims import Claim, Claims, Party, Pause
+from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
 
 ZONES = "ABC"
 ARMS = "abcd"
@@ -56,12 +56,12 @@ class Doer:
     paused: AbstractContextManager[None] | None = None
 
     def __post_init__(self) -> None:
-        self.party = Party(f"program {self.name}")
+        self.party = ZoneHolder(f"program {self.name}")
 
     def __repr__(self) -> str:
         return self.name
 
-    def line(self) -> frozenset[Party]:
+    def line(self) -> frozenset[ZoneHolder]:
         """As whom it acts."""
         return frozenset([self.party]) | (self.parent.line() if self.parent else frozenset())
 
@@ -84,11 +84,11 @@ class Arm:
     jogged: bool = False
     driver: Doer | None = None
     turn: Doer | None = None
-    commanding: tuple[Party, ...] = ()
+    commanding: tuple[ZoneHolder, ...] = ()
     behind: list[tuple[Doer, Then]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.party = Party(self.name, moving=lambda: self.moves)
+        self.party = ZoneHolder(self.name, moving=lambda: self.moves)
 
     def __repr__(self) -> str:
         return self.name
@@ -100,15 +100,15 @@ class Cell(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.pick: Pick = Random(0).choice
-        self.claims = Claims()
+        self.claims = ZoneLocks()
         self.arms = {name: Arm(name) for name in ARMS}
         self.doers = {name: Doer(name) for name in ARMS}
         for name, parent in TASKS.items():
             self.doers[name] = Doer(name, self.doers[parent])
 
-        self.holds: dict[Claim, frozenset[str]] = {}
-        self.waiting: list[Claim] = []
-        self.pauses: list[Pause] = []
+        self.holds: dict[ZoneRequest, frozenset[str]] = {}
+        self.waiting: list[ZoneRequest] = []
+        self.pauses: list[ProgramWait] = []
         self.come: list[Doer] = []
         self.ending: DobotError | None = None
 
@@ -154,7 +154,7 @@ class Cell(RuleBasedStateMachine):
             arm.jogged = jogs
 
         arm.driver = doer
-        claim = Claim(
+        claim = ZoneRequest(
             arm.party,
             doer.line() | {arm.party},
             frozenset(self.pick(WAYS)),
@@ -189,8 +189,8 @@ class Cell(RuleBasedStateMachine):
             self.give_back(claim)
 
         movers = frozenset(arm.party for arm in arms)
-        claim = Claim(
-            Party("the start"),
+        claim = ZoneRequest(
+            ZoneHolder("the start"),
             doer.line() | movers,
             frozenset(ways),
             stuck=self.driven(doer),
@@ -205,7 +205,7 @@ class Cell(RuleBasedStateMachine):
         its = frozenset([self.arms[doer.name].party] if doer.name in ARMS else [])
         own = doer.line() | its | self.driven(doer)
         zones = frozenset(self.pick(WAYS))
-        self.ask(doer, Claim(doer.party, own, zones, parked=partial(self.parked, doer)), lambda: None)
+        self.ask(doer, ZoneRequest(doer.party, own, zones, parked=partial(self.parked, doer)), lambda: None)
 
     def meet(self, doer: Doer) -> None:
         """A program comes to the barrier of all."""
@@ -218,7 +218,7 @@ class Cell(RuleBasedStateMachine):
 
     def give_up(self, doer: Doer) -> None:
         """A program waits no longer."""
-        if isinstance(doer.wait, Claim):
+        if isinstance(doer.wait, ZoneRequest):
             claim, doer.wait = doer.wait, None
             self.waiting.remove(claim)
             self.claims.release(claim)
@@ -320,16 +320,16 @@ class Cell(RuleBasedStateMachine):
     def ready(self) -> list[Doer]:
         return [doer for doer in self.doers.values() if doer.alive and not doer.wait and not doer.then]
 
-    def held_by(self, *parties: Party) -> list[Claim]:
+    def held_by(self, *parties: ZoneHolder) -> list[ZoneRequest]:
         return [claim for claim in self.holds if claim.party in parties]
 
     def in_doubt(self) -> list[Doer]:
         return [doer for doer in self.doers.values() if doer.wait and not doer.then]
 
-    def driven(self, doer: Doer) -> frozenset[Party]:
+    def driven(self, doer: Doer) -> frozenset[ZoneHolder]:
         return frozenset(arm.party for arm in self.arms.values() if arm.driver is doer)
 
-    def parked(self, doer: Doer, party: Party) -> bool:
+    def parked(self, doer: Doer, party: ZoneHolder) -> bool:
         """Whether nobody is left who would move an arm while a program waits."""
         arm, own = self.arms.get(party.name), doer
         while own.parent:
@@ -340,7 +340,7 @@ class Cell(RuleBasedStateMachine):
 
         return arm.driver is None or not arm.driver.alive
 
-    def absent(self, doer: Doer) -> list[Party]:
+    def absent(self, doer: Doer) -> list[ZoneHolder]:
         """Who keeps one who has come from going on."""
         return (
             [self.doers[name].party for name in ARMS if self.doers[name] not in self.come] if doer in self.come else []
@@ -378,9 +378,9 @@ class Cell(RuleBasedStateMachine):
         arm.commanding = (doer.party,)
         go()
 
-    def pause(self, doer: Doer, what: str, awaited: Callable[[], list[Party] | tuple[Party, ...]]) -> bool:
+    def pause(self, doer: Doer, what: str, awaited: Callable[[], list[ZoneHolder] | tuple[ZoneHolder, ...]]) -> bool:
         """A program waits for others; False if it was told that it would do so for ever."""
-        pause = Pause(what, doer.party, self.driven(doer) | {doer.party}, awaited)
+        pause = ProgramWait(what, doer.party, self.driven(doer) | {doer.party}, awaited)
         self.pauses.append(pause)
         doer.wait, doer.paused = pause, self.claims.pausing(pause)
         try:
@@ -396,21 +396,21 @@ class Cell(RuleBasedStateMachine):
     def wake(self, doer: Doer) -> None:
         """A program waits for others no longer."""
         pause, doer.wait = doer.wait, None
-        assert isinstance(pause, Pause)
+        assert isinstance(pause, ProgramWait)
         assert doer.paused
         self.pauses.remove(pause)
         doer.paused.__exit__(None, None, None)
 
     def take(self, arm: Arm, zones: str) -> None:
-        claim = Claim(arm.party, frozenset([arm.party]), frozenset(zones))
+        claim = ZoneRequest(arm.party, frozenset([arm.party]), frozenset(zones))
         self.holds[claim] = claim.zones
         self.claims.take(claim)
 
-    def give_back(self, claim: Claim) -> None:
+    def give_back(self, claim: ZoneRequest) -> None:
         self.holds.pop(claim, None)
         self.claims.release(claim)
 
-    def ask(self, doer: Doer, claim: Claim, granted: Then) -> None:
+    def ask(self, doer: Doer, claim: ZoneRequest, granted: Then) -> None:
         """A program makes a claim, with the turns of the arms that it is for."""
 
         def answer(error: DobotError | None) -> None:
@@ -430,7 +430,7 @@ class Cell(RuleBasedStateMachine):
         self.waiting.append(claim)
         self.claims.request(claim)
 
-    def judge(self, claim: Claim, error: DobotError | None) -> None:
+    def judge(self, claim: ZoneRequest, error: DobotError | None) -> None:
         """Whether an answer is true."""
         scene = self.scene()
         if error is None:

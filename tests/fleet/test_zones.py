@@ -13,7 +13,7 @@ from virtual import virtual
 from dobot_async import ArmAlarm, DobotError, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
 from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Cylinder, Member, ZoneDeadlock, ZoneOccupied
-from dobot_async.fleet.claims import Claim, Party
+from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
 from dobot_async.fleet.zones import Zones
 from dobot_async.simulator import Simulation, simulate
 
@@ -278,7 +278,7 @@ async def test_a_helper_that_waits_for_a_zone_keeps_nobody_from_a_barrier() -> N
 
 @virtual
 async def test_a_stop_ends_a_claim_that_is_not_judged_yet() -> None:
-    arms = {name: Party(name) for name in ("left", "right")}
+    arms = {name: ZoneHolder(name) for name in ("left", "right")}
     zones = Zones({"belt": None}, arms)
     caught_up = asyncio.Event()
 
@@ -286,8 +286,8 @@ async def test_a_stop_ends_a_claim_that_is_not_judged_yet() -> None:
         await caught_up.wait()
 
     zones.guards.append(catch_up)
-    zones.claims.take(Claim(arms["left"], frozenset([arms["left"]]), frozenset(["belt"])))
-    claim = Claim(arms["right"], frozenset([arms["right"]]), frozenset(["belt"]))
+    zones.claims.take(ZoneRequest(arms["left"], frozenset([arms["left"]]), frozenset(["belt"])))
+    claim = ZoneRequest(arms["right"], frozenset([arms["right"]]), frozenset(["belt"]))
     asking = asyncio.create_task(zones.claim(claim, None))
     await asyncio.sleep(1)
     zones.claims.interrupt(arms["right"], MotionStopped("enough"))

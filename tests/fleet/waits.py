@@ -1,4 +1,4 @@
-"""Who can never go on: a wait-for graph, built from what claims and pauses say, that shares no code with `Claims`.
+"""Who can never go on: a wait-for graph, built from what claims and pauses say, that shares no code with `ZoneLocks`.
 
 A wait leads to another one if that has to end before. A claim waits for the holders of its zones, none of whom leaves
 before all waits have ended in which it is stuck, unless it moves; a pause waits for parties, none of whom comes before
@@ -13,11 +13,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dobot_async.fleet.claims import Claim, Claims, Party, Pause
+from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
 
 __all__ = ["Scene", "Wait", "end", "named", "watch"]
 
-Wait = Claim | Pause
+Wait = ZoneRequest | ProgramWait
 TICK = 0.01  # virtual seconds between two looks
 TURNS = 5  # of the loop, in which what has just happened is told to all
 
@@ -32,12 +32,12 @@ class Scene:
         pauses: Those that go on.
     """
 
-    held: Sequence[tuple[Party, frozenset[str]]]
-    claims: Sequence[Claim]
-    pauses: Sequence[Pause]
+    held: Sequence[tuple[ZoneHolder, frozenset[str]]]
+    claims: Sequence[ZoneRequest]
+    pauses: Sequence[ProgramWait]
 
     @classmethod
-    def of(cls, claims: Claims) -> Scene:
+    def of(cls, claims: ZoneLocks) -> Scene:
         """What is the case in a cell."""
         held = [(claim.party, claim.zones) for claim in claims.held]
         return cls(held, claims.waiting, list(claims._pauses))
@@ -48,12 +48,12 @@ class Scene:
         vain = [(claim, why) for claim in self.claims for why in self.in_vain(claim)]
         return [*granted, *vain, *((wait, "all that it waits for waits for it") for wait in self.endless())]
 
-    def in_the_way(self, claim: Claim) -> list[Party]:
+    def in_the_way(self, claim: ZoneRequest) -> list[ZoneHolder]:
         """Who holds what it is for; where it is known to be already, it may go on beside others."""
         wanted = claim.zones - claim.party.inside
         return [party for party, zones in self.held if party not in claim.own and wanted & zones]
 
-    def in_vain(self, claim: Claim) -> Iterator[str]:
+    def in_vain(self, claim: ZoneRequest) -> Iterator[str]:
         """Whether it waits for somebody who will never leave."""
         for party in self.in_the_way(claim):
             if party.failure:
@@ -64,13 +64,13 @@ class Scene:
     def before(self, wait: Wait) -> list[Wait]:
         """What has to end before a wait does, whoever comes first."""
         waits: list[Wait] = [*self.claims, *self.pauses]
-        if isinstance(wait, Pause):
+        if isinstance(wait, ProgramWait):
             return [each for party in wait.awaited() for each in waits if each.asker is party]
 
         resting = [party for party in self.in_the_way(wait) if not party.moving()]
         return [each for party in resting for each in waits if party in each.stuck]
 
-    def earlier(self, claim: Claim) -> list[Claim]:
+    def earlier(self, claim: ZoneRequest) -> list[ZoneRequest]:
         """Those that came first for the same."""
         return [each for each in self.claims[: self.claims.index(claim)] if each.zones & claim.zones]
 
@@ -84,15 +84,15 @@ class Scene:
 
             left = [wait for wait in left if wait not in ending]
 
-    def is_due(self, claim: Claim) -> bool:
+    def is_due(self, claim: ZoneRequest) -> bool:
         """Whether its zones are free, and who came first waits for it anyway."""
         return not self.in_the_way(claim) and all(claim in self.all_before(each) for each in self.earlier(claim))
 
-    def all_before(self, claim: Claim) -> list[Wait]:
+    def all_before(self, claim: ZoneRequest) -> list[Wait]:
         """What has to end, directly or not, before a claim is granted in its turn."""
         found: list[Wait] = [claim]
         for each in found:  # which grows
-            turns: Sequence[Wait] = self.earlier(each) if isinstance(each, Claim) else []
+            turns: Sequence[Wait] = self.earlier(each) if isinstance(each, ZoneRequest) else []
             found += [other for other in (*self.before(each), *turns) if other not in found]
 
         return found[1:]
@@ -101,10 +101,10 @@ class Scene:
 def named(wait: Wait) -> str:
     """A wait, for messages."""
     who = wait.asker.name if wait.asker else "?"
-    return f"{who} {wait.what}" if isinstance(wait, Pause) else f"{who}, for {sorted(wait.zones)},"
+    return f"{who} {wait.what}" if isinstance(wait, ProgramWait) else f"{who}, for {sorted(wait.zones)},"
 
 
-async def watch(claims: Claims) -> Any:
+async def watch(claims: ZoneLocks) -> Any:
     """Looks until it is cancelled; raises AssertionError if somebody is left to wait who should have been told."""
     while True:
         before = {wait for wait, _ in Scene.of(claims).forgotten()}

@@ -10,14 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dobot_async.following.points import Point, apart, nearer_than, part_of_way, read_point, turns_back, way_along
+from dobot_async.following.points import TargetPoint, apart, nearer_than, part_of_way, read_point, turns_back, way_along
 from dobot_async.following.trajectory import Trajectory
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 numbers = st.floats(-500, 500)
 angles = st.floats(-180, 180)
-places = st.builds(lambda xyz, turned: Point((*xyz, *turned)), st.tuples(*[numbers] * 3), st.tuples(*[angles] * 3))
-joints = st.builds(lambda each: Point(each, joints=True), st.tuples(*[angles] * 6))
+places = st.builds(
+    lambda xyz, turned: TargetPoint((*xyz, *turned)), st.tuples(*[numbers] * 3), st.tuples(*[angles] * 3)
+)
+joints = st.builds(lambda each: TargetPoint(each, joints=True), st.tuples(*[angles] * 6))
 steps = st.floats(0.1, 50)
 
 
@@ -34,7 +36,7 @@ class Pose:
 
 @given(places, places, steps, steps)
 def test_a_step_is_no_longer_than_it_may_be_and_leads_there(
-    start: Point, end: Point, mm: float, degrees: float
+    start: TargetPoint, end: TargetPoint, mm: float, degrees: float
 ) -> None:
     step = part_of_way(start, end, mm, degrees, turns=True)
     length, turn = way_along(start, step, turns=True)
@@ -48,7 +50,7 @@ def test_a_step_is_no_longer_than_it_may_be_and_leads_there(
 
 
 @given(joints, joints, steps)
-def test_a_step_in_joints_knows_degrees_alone(start: Point, end: Point, degrees: float) -> None:
+def test_a_step_in_joints_knows_degrees_alone(start: TargetPoint, end: TargetPoint, degrees: float) -> None:
     step = part_of_way(start, end, 0.0, degrees)
     assert step.joints
     assert way_along(start, step)[0] == 0
@@ -56,20 +58,20 @@ def test_a_step_in_joints_knows_degrees_alone(start: Point, end: Point, degrees:
 
 
 def test_angles_go_the_short_way_round() -> None:
-    start, end = Point((0, 0, 0, 0, 0, 175)), Point((0, 0, 0, 0, 0, -175))
+    start, end = TargetPoint((0, 0, 0, 0, 0, 175)), TargetPoint((0, 0, 0, 0, 0, -175))
     assert way_along(start, end, turns=True) == pytest.approx((0, 10))
     assert part_of_way(start, end, 1, 7, turns=True).numbers[5] == pytest.approx(-178)
     assert way_along(start, end)[1] == 350  # of an arm whose angles are not the same after a turn
 
 
 def test_what_is_near_and_what_is_behind() -> None:
-    here, sent = Point((0.0, 0.0, 0.0, 0.0)), Point((10.0, 0.0, 0.0, 0.0))
-    assert nearer_than(here, Point((0.3, 0.4, 0.0, 0.5)), (0.5, 0.5))
-    assert not nearer_than(here, Point((0.3, 0.4, 0.1, 0.5)), (0.5, 0.5))
-    assert not nearer_than(here, Point((0.0, 0.0, 0.0, 0.6)), (0.5, 0.5))
-    assert apart(here, Point((3.0, 4.0, 0.0, 12.0))) == 13
-    assert turns_back(here, sent, Point((-1.0, 5.0, 0.0, 0.0)))
-    assert not turns_back(here, sent, Point((1.0, 50.0, 0.0, 0.0)))
+    here, sent = TargetPoint((0.0, 0.0, 0.0, 0.0)), TargetPoint((10.0, 0.0, 0.0, 0.0))
+    assert nearer_than(here, TargetPoint((0.3, 0.4, 0.0, 0.5)), (0.5, 0.5))
+    assert not nearer_than(here, TargetPoint((0.3, 0.4, 0.1, 0.5)), (0.5, 0.5))
+    assert not nearer_than(here, TargetPoint((0.0, 0.0, 0.0, 0.6)), (0.5, 0.5))
+    assert apart(here, TargetPoint((3.0, 4.0, 0.0, 12.0))) == 13
+    assert turns_back(here, sent, TargetPoint((-1.0, 5.0, 0.0, 0.0)))
+    assert not turns_back(here, sent, TargetPoint((1.0, 50.0, 0.0, 0.0)))
 
 
 @pytest.mark.parametrize(
@@ -83,8 +85,8 @@ def test_what_is_near_and_what_is_behind() -> None:
     ],
 )
 def test_a_target_is_a_pose_or_numbers(target: Any, as_joints: bool, expected: tuple[float, ...]) -> None:
-    here = Point((0, 0, 0, 0.1, 0.2, 0.3))
-    assert read_point(target, AXES, 6, here, as_joints=as_joints) == Point(expected, as_joints)
+    here = TargetPoint((0, 0, 0, 0.1, 0.2, 0.3))
+    assert read_point(target, AXES, 6, here, as_joints=as_joints) == TargetPoint(expected, as_joints)
 
 
 @pytest.mark.parametrize(
@@ -102,16 +104,16 @@ def test_a_target_is_a_pose_or_numbers(target: Any, as_joints: bool, expected: t
 )
 def test_what_is_no_target_is_told(target: Any, as_joints: bool, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
-        read_point(target, AXES, 6, Point((0.0,) * 6), as_joints=as_joints)
+        read_point(target, AXES, 6, TargetPoint((0.0,) * 6), as_joints=as_joints)
 
 
 def test_angles_that_nothing_tells_have_to_be_given() -> None:
     with pytest.raises(ValueError, match="give all of x, y"):
-        read_point((1, 2, 3), AXES, 6, Point((0.0,) * 6, joints=True))
+        read_point((1, 2, 3), AXES, 6, TargetPoint((0.0,) * 6, joints=True))
 
 
 def trajectory(*points: tuple[float, Any], mm: float = 100.0, degrees: float = 90.0) -> Trajectory:
-    here = Point((0.0,) * 6)
+    here = TargetPoint((0.0,) * 6)
     return Trajectory(points, lambda target: read_point(target, AXES, 6, here), mm=mm, degrees=degrees, turns=True)
 
 

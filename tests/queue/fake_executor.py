@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dobot_async._core.protocol.wire import Command, Queueing
-from dobot_async._core.queue.executor import Entry, Source, alarmed
+from dobot_async._core.queue.executor import Entry, MotionSource, alarmed
 from dobot_async._core.queue.keeper import Keeper
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
@@ -130,7 +130,7 @@ class FakeExecutor:
 
         return Entry(command, value, None)
 
-    async def submit(self, source: Source) -> None:
+    async def submit(self, source: MotionSource) -> None:
         if self._under_way:
             entry, ticket = self._under_way
             self._under_way = None

@@ -12,7 +12,7 @@ from virtual import virtual
 
 from dobot_async._core.protocol.layouts import NOTHING
 from dobot_async._core.protocol.wire import Command, Queueing
-from dobot_async._core.queue.executor import Entry, Source
+from dobot_async._core.queue.executor import Entry, MotionSource
 from dobot_async._core.queue.keeper import Keeper
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
@@ -52,7 +52,7 @@ class FakeExecutor:
         """Takes anything."""
         return Entry(command, value, None)
 
-    async def submit(self, source: Source) -> None:
+    async def submit(self, source: MotionSource) -> None:
         """Takes all."""
         while source:
             self.taken += 1

@@ -33,6 +33,7 @@ HARD = {
 HARD_CELLS = {
     ("cell", 900895): "an arm that comes to rest and does not tell where, while all wait and nothing else happens",
     ("guards", 50159): "an arm that may be anywhere along its rail, and one with leftovers in its queue",
+    ("guards", 50728): "a longer tool that was queued behind a motion which an alarm ended",
 }
 """The same of the scenarios of several arms."""
 

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dobot_async.simulator.device.device import Activity, Device, DeviceOptions, Executed, Fault, Vector, Work
+from dobot_async.simulator.device.device import Activity, Device, DeviceFault, DeviceOptions, Executed, Vector, Work
 from dobot_async.simulator.device.path import joint_leg, travel
-from dobot_async.simulator.device.profile import Pace
+from dobot_async.simulator.device.profile import SpeedLimits
 
-PACE = Pace((100.0, 100.0), (200.0, 200.0))
+PACE = SpeedLimits((100.0, 100.0), (200.0, 200.0))
 LITE = DeviceOptions(on_fault="continue")
 BEGIN_FAULT, END_FAULT, LIMIT = 0x11, 0x22, 0x40
 
@@ -69,14 +69,14 @@ def move(*target: float, name: str = "move") -> Work:
 
 def move_into_fault(*target: float) -> Work:
     def begin(device: Device) -> Activity:
-        return travel([joint_leg(device.joints, target, PACE, fault=Fault(END_FAULT))])
+        return travel([joint_leg(device.joints, target, PACE, fault=DeviceFault(END_FAULT))])
 
     return Work("strand", begin, moves=True)
 
 
 def unreachable() -> Work:
     def begin(device: Device) -> Activity:
-        raise Fault(BEGIN_FAULT)
+        raise DeviceFault(BEGIN_FAULT)
 
     return Work("unreachable", begin, moves=True)
 
@@ -88,7 +88,7 @@ def trigger(key: str = "pin", level: float = 1.0) -> Work:
 def jog(limit: float) -> Work:
     def begin(device: Device) -> Activity:
         there = (limit, device.joints[1])
-        return travel([joint_leg(device.joints, there, PACE, fault=Fault(LIMIT), leave=math.inf)])
+        return travel([joint_leg(device.joints, there, PACE, fault=DeviceFault(LIMIT), leave=math.inf)])
 
     return Work("jog", begin, moves=True)
 

@@ -27,7 +27,7 @@ from virtual import run_virtual, virtual
 from dobot_async import ConnectFailed, IOFunction, Magician
 from dobot_async._core.protocol.transport import Transport
 from dobot_async.simulator import Faults, Simulation, simulate, simulation
-from dobot_async.simulator.faults import Channel
+from dobot_async.simulator.faults import FaultyChannel
 from dobot_async.simulator.url import open_url
 from dobot_async.transports import open_transport
 
@@ -104,13 +104,13 @@ async def until(condition: Callable[[], object]) -> None:
 def heard(monkeypatch: pytest.MonkeyPatch) -> bytearray:
     """All that reaches simulated arms, before the faults of their lines."""
     arrived = bytearray()
-    send = simulation.Client.send
+    send = simulation.SimulatedClient.send
 
-    def noted(client: simulation.Client, data: bytes) -> None:
+    def noted(client: simulation.SimulatedClient, data: bytes) -> None:
         arrived.extend(data)
         send(client, data)
 
-    monkeypatch.setattr(simulation.Client, "send", noted)
+    monkeypatch.setattr(simulation.SimulatedClient, "send", noted)
     return arrived
 
 
@@ -875,7 +875,7 @@ def carried(messages: Iterable[bytes], seed: int, pause: float, *, ordered: bool
     arrived: list[bytes] = []
 
     async def carry() -> None:
-        channel = Channel(Faults(**faults), Random(seed), arrived.append, ordered=ordered)
+        channel = FaultyChannel(Faults(**faults), Random(seed), arrived.append, ordered=ordered)
         for message in messages:
             channel.send(message)
             await asyncio.sleep(pause)

@@ -19,7 +19,7 @@ from dobot_async.arms.magician.alarms import IGNORED
 from dobot_async.arms.magician.frame import MAX_PARAMS, QUEUED, WRITE, Frame, Parser, encode, request
 from dobot_async.arms.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.simulator.device.device import DeviceOptions
-from dobot_async.simulator.magician.arm import MAGICIAN, Quirks, Session, SimulatedMagician
+from dobot_async.simulator.magician.arm import MAGICIAN, MagicianSession, Quirks, SimulatedMagician
 from dobot_async.simulator.magician.jog import margins
 
 Row = Command[Any, Any]
@@ -40,7 +40,7 @@ class Bench:
         self.arm = SimulatedMagician(lambda: self.now, self.options, self.quirks)
         self.session = self.arm.session()
 
-    def send(self, frame: Frame, session: Session | None = None) -> Frame | None:
+    def send(self, frame: Frame, session: MagicianSession | None = None) -> Frame | None:
         """Sends one frame, returns the reply."""
         replies = Parser().feed((session or self.session).receive(bytes(frame)))
         assert len(replies) <= 1

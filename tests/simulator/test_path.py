@@ -11,14 +11,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from dobot_async.arms.magician.kinematics import JointLimits, Kinematics, Unreachable
-from dobot_async.simulator.device.curve import Arc, Line, arc, circle
-from dobot_async.simulator.device.device import Activity, Device, Fault, Vector, Work
+from dobot_async.simulator.device.curve import Arc, LineSegment, arc, circle
+from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Vector, Work
 from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg, jump, travel
-from dobot_async.simulator.device.profile import Pace, Profile, shared, trapezoid
+from dobot_async.simulator.device.profile import Profile, SpeedLimits, shared, trapezoid
 
-JOINTS = Pace((200.0,) * 4, (400.0,) * 4)
-TOOL = Pace((100.0, 200.0), (400.0, 800.0))
-SLOW = Pace((10.0, 1e6), (1e9, 1e9))
+JOINTS = SpeedLimits((200.0,) * 4, (400.0,) * 4)
+TOOL = SpeedLimits((100.0, 200.0), (400.0, 800.0))
+SLOW = SpeedLimits((10.0, 1e6), (1e9, 1e9))
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Solver:
         try:
             return self.kinematics.check(*point)
         except Unreachable as error:
-            raise Fault(error.alarm) from None
+            raise DeviceFault(error.alarm) from None
 
 
 SOLVER = Solver()
@@ -44,12 +44,12 @@ def at(*point: float) -> Vector:
     return SOLVER.inverse(point)
 
 
-def leg_to(*target: float, start: Vector, pace: Pace = TOOL) -> Leg:
-    return curve_leg(Line(SOLVER.forward(start), target), start, SOLVER, pace)
+def leg_to(*target: float, start: Vector, pace: SpeedLimits = TOOL) -> Leg:
+    return curve_leg(LineSegment(SOLVER.forward(start), target), start, SOLVER, pace)
 
 
 def code_of(attempt: Callable[[], object]) -> int:
-    with pytest.raises(Fault) as caught:
+    with pytest.raises(DeviceFault) as caught:
         attempt()
 
     return caught.value.code
@@ -111,7 +111,7 @@ def test_rest_to_rest_takes_the_textbook_time(length: float, velocity: float, ac
 
 
 def test_the_slowest_joint_leads() -> None:
-    pace = Pace((100.0, 10.0, 100.0), (1000.0, 100.0, 1000.0))
+    pace = SpeedLimits((100.0, 10.0, 100.0), (1000.0, 100.0, 1000.0))
     assert shared((50, -50, 0), pace).duration == pytest.approx(trapezoid(50, 10, 100).duration)
     assert shared((50, 1e-12, 0), pace).duration == pytest.approx(trapezoid(50, 100, 1000).duration)
     assert shared((0, 0, 0), pace).duration == 0
@@ -239,13 +239,13 @@ def test_the_arm_may_move_back_from_beyond_a_limit() -> None:
     back = leg_to(200, 0, 0, 0, start=beyond)
     assert back.fault is None
     assert SOLVER.forward(back.joints(0.5)) == pytest.approx((200, 0, 0, 80))
-    further = curve_leg(Line((200, 0, 0, 160), (200, 0, 0, 190)), beyond, SOLVER, TOOL, must_arrive=False)
+    further = curve_leg(LineSegment((200, 0, 0, 160), (200, 0, 0, 190)), beyond, SOLVER, TOOL, must_arrive=False)
     assert further.fault is not None
     assert (further.fault.code, further.end, further.duration) == (0x22, beyond, 0)
 
 
 def test_an_end_that_need_not_be_reached() -> None:
-    line = Line((250, 0, 0, 0), (1250, 0, 0, 0))
+    line = LineSegment((250, 0, 0, 0), (1250, 0, 0, 0))
     leg = curve_leg(line, at(*line.start), SOLVER, SLOW, must_arrive=False)
     assert leg.fault is not None
     assert leg.fault.code in {0x21, 0x22}
@@ -254,7 +254,7 @@ def test_an_end_that_need_not_be_reached() -> None:
 
 
 def test_only_the_end_is_looked_at_when_nothing_else_is_asked_for() -> None:
-    line = Line((20, -200, 0, -90), (20, 200, 0, 90))
+    line = LineSegment((20, -200, 0, -90), (20, 200, 0, 90))
     leg = curve_leg(line, at(*line.start), SOLVER, TOOL, every=math.inf)
     assert leg.fault is None
     assert leg.joints(0.5) == at(*line.start), "shown where it was last seen"
@@ -262,7 +262,7 @@ def test_only_the_end_is_looked_at_when_nothing_else_is_asked_for() -> None:
 
 
 def test_points_of_a_path_keep_their_speed() -> None:
-    line = Line((200, 0, 0, 0), (210, 0, 0, 0))
+    line = LineSegment((200, 0, 0, 0), (210, 0, 0, 0))
     leg = curve_leg(line, at(*line.start), SOLVER, TOOL, enter=100, leave=100)
     assert leg.duration == pytest.approx(0.1)
 
@@ -276,7 +276,7 @@ def test_six_joints_and_six_coordinates() -> None:
             return point
 
     start, end = (0.0,) * 6, (30.0, 40.0, 0.0, 90.0, 0.0, -180.0)
-    leg = curve_leg(Line(start, end), start, Straight(), Pace((100.0, 90.0), (1e9, 1e9)))
+    leg = curve_leg(LineSegment(start, end), start, Straight(), SpeedLimits((100.0, 90.0), (1e9, 1e9)))
     assert leg.duration == pytest.approx(2.0, abs=1e-3)
     assert leg.end == end
 

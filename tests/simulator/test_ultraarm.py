@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.frame import Parser, encode
 from dobot_async.simulator import DeviceOptions, SimulatedUltraArm, UltraArmQuirks, simulate
-from dobot_async.simulator.device.work import Fault
+from dobot_async.simulator.device.work import DeviceFault
 from dobot_async.simulator.ultraarm.kinematics import REACH, forward, inverse
 
 PLAIN = UltraArmQuirks(acknowledge="ok")
@@ -309,7 +309,7 @@ def test_joints_and_points_belong_together(j1: float, j2: float, j3: float) -> N
     point = forward((j1, j2, j3, 5.0))
     try:
         joints = inverse(point)
-    except Fault:
+    except DeviceFault:
         return  # a posture that a point is not reached in
 
     assert forward(joints) == pytest.approx(point, abs=1e-6)
@@ -318,7 +318,7 @@ def test_joints_and_points_belong_together(j1: float, j2: float, j3: float) -> N
 def test_the_geometry_is_the_librarys_ranges() -> None:
     assert forward((0, 0, 0, 0)) == pytest.approx((235.55, 0, 130, 0))
     assert forward((0, 90, 0, 0))[0] == pytest.approx(365.55)
-    with pytest.raises(Fault):
+    with pytest.raises(DeviceFault):
         inverse((10, 0, 0, 0))
 
 

@@ -109,7 +109,7 @@ PAGES: dict[str, Page] = {
         "A Dobot Magician, for programs without asyncio.",
         (
             Twin("dobot_async.arms.magician.queue:Batch", verbs="Motion", base="BatchTwin"),
-            Twin("dobot_async.arms.magician.queue:Program", verbs="Motion", base="BatchTwin"),
+            Twin("dobot_async.arms.magician.queue:Download", verbs="Motion", base="BatchTwin"),
             Twin(
                 "dobot_async.arms.magician.queue:MagicianQueue",
                 verbs="Motion",

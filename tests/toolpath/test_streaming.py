@@ -15,7 +15,7 @@ from virtual import virtual
 
 from dobot_async import Magician
 from dobot_async.arms.magician import commands as m
-from dobot_async.endpoints.line_rate import AtBaud
+from dobot_async.endpoints.line_rate import RateLimited
 from dobot_async.simulator import Simulation, memory, simulate
 from dobot_async.simulator.device.work import Executed
 from dobot_async.simulator.magician.arm import MAGICIAN
@@ -37,7 +37,7 @@ def rings(points: int, strokes: int) -> Toolpath:
     return Toolpath.of(*found)
 
 
-class SlowLine(AtBaud[Any]):
+class SlowLine(RateLimited[Any]):
     """A simulation behind a serial line of that speed, without a pty, so that its time may be virtual."""
 
     def __init__(self, simulation: Simulation) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from virtual import run_virtual, virtual
 
 from dobot_async import Magician
-from dobot_async.endpoints.line_rate import AHEAD, AtBaud, SerialLine, Wired
+from dobot_async.endpoints.line_rate import AHEAD, RateLimited, RateLimitedLine, Wired
 from dobot_async.endpoints.pty import on_pty
 from dobot_async.simulator import simulate
 from dobot_async.transports import open_transport
@@ -31,7 +31,7 @@ def now() -> float:
 @virtual
 async def test_the_last_bit_of_what_was_sent_arrives_when_the_baud_rate_says() -> None:
     arrived: list[tuple[float, bytes]] = []
-    line = SerialLine(BAUD, lambda data: arrived.append((now(), data)))
+    line = RateLimitedLine(BAUD, lambda data: arrived.append((now(), data)))
     begun = now()
     line.send(bytes(38))
     await asyncio.sleep(1)
@@ -55,7 +55,7 @@ def test_each_byte_arrives_once_in_order_and_at_most_a_piece_late(messages: list
             arrived.extend([now()] * len(data))
             received.extend(data)
 
-        line = SerialLine(BAUD, deliver)
+        line = RateLimitedLine(BAUD, deliver)
         due: list[float] = []
         free_at = 0.0
         for pause, data in messages:
@@ -83,7 +83,7 @@ async def test_a_long_transfer_does_not_drift() -> None:
         nonlocal last
         last = now()
 
-    line = SerialLine(BAUD, deliver)
+    line = RateLimitedLine(BAUD, deliver)
     begun = now()
     line.send(bytes(115_200))
     await asyncio.sleep(20)
@@ -93,7 +93,7 @@ async def test_a_long_transfer_does_not_drift() -> None:
 @virtual
 async def test_what_was_cleared_never_arrives() -> None:
     arrived: list[bytes] = []
-    line = SerialLine(BAUD, arrived.append)
+    line = RateLimitedLine(BAUD, arrived.append)
     line.send(bytes(100))
     line.clear()
     await asyncio.sleep(1)
@@ -142,7 +142,7 @@ async def test_both_ways_have_their_own_line_and_a_client_far_ahead_is_held() ->
     received = bytearray()
     holds: list[bool] = []
     host = Echo()
-    slow = AtBaud(host, BAUD)
+    slow = RateLimited(host, BAUD)
     client: Wired[EchoClient] = slow.client(received.extend, lambda: None, ordered=True, hold=holds.append)
     client.send(bytes(AHEAD + 100))
     assert holds == [True]
@@ -165,7 +165,7 @@ async def test_both_ways_have_their_own_line_and_a_client_far_ahead_is_held() ->
 @virtual
 async def test_a_client_that_has_sent_nothing_leaves_at_once_and_one_that_is_hung_up_on_is_not_waited_for() -> None:
     host = Echo()
-    slow = AtBaud(host, BAUD)
+    slow = RateLimited(host, BAUD)
     hung_up: list[int] = []
 
     def connected() -> Wired[EchoClient]:
@@ -193,7 +193,7 @@ async def test_a_client_that_has_sent_nothing_leaves_at_once_and_one_that_is_hun
 async def test_what_was_written_before_a_port_is_closed_arrives() -> None:
     async with AsyncExitStack() as stack:
         host = Echo()
-        url = await on_pty(AtBaud(host, 9600), stack, lasting=False)
+        url = await on_pty(RateLimited(host, 9600), stack, lasting=False)
         transport = await open_transport(f"{url}?baud=9600", arm="magician")
         for number in range(10):
             await transport.send(bytes((number,)) * 20)

@@ -51,10 +51,10 @@ from dbus_fast.aio import MessageBus
 
 from dobot_async._core.util.tasks import Ended, run_shielded, run_within
 from dobot_async.simulator.ble import bluez
-from dobot_async.simulator.ble.link_layer import Radio, round_trip
-from dobot_async.simulator.ble.module import Module
+from dobot_async.simulator.ble.link_layer import RadioSettings, round_trip
+from dobot_async.simulator.ble.module import BleModule
 from dobot_async.simulator.ble.names import ADAPTER
-from dobot_async.simulator.ble.testbed import Rig, rig
+from dobot_async.simulator.ble.testbed import BlueZTestbed, rig
 from dobot_async.transports.ble import diagnostics as ble_advice
 from dobot_async.transports.ble import lock as ble_claim
 from dobot_async.transports.ble import opening
@@ -81,7 +81,7 @@ MOVE = encode(Frame(c.SET_PTP_CMD.id, 3, c.SET_PTP_CMD.request.encode(c.PTPCmd(P
 
 
 @pytest.fixture
-async def world() -> AsyncIterator[Rig]:
+async def world() -> AsyncIterator[BlueZTestbed]:
     """A bus with BlueZ on it."""
     async with rig() as made:
         yield made
@@ -95,7 +95,7 @@ async def sim() -> AsyncIterator[Simulation]:
 
 
 @pytest.fixture
-async def module(world: Rig, sim: Simulation) -> Module:
+async def module(world: BlueZTestbed, sim: Simulation) -> BleModule:
     """The arm's BLE module, on a good connection."""
     return world.add(sim, fast())
 
@@ -107,9 +107,9 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(opening, "PAUSES", (0.01, 0.01))
 
 
-def fast(**details: Any) -> Radio:
+def fast(**details: Any) -> RadioSettings:
     """A connection that costs a test little time."""
-    return Radio(interval=FAST, advertising=0.02, **details)
+    return RadioSettings(interval=FAST, advertising=0.02, **details)
 
 
 @asynccontextmanager
@@ -233,26 +233,26 @@ def test_who_is_wanted(text: str, who: ble_scan.Seen, fits: bool) -> None:
 @pytest.mark.parametrize(
     "url", ["ble:", "ble://WH-BLE 102", "ble://WH-BLE%20102", "ble://D8:B0:4C:B3:38:68", "ble://d8-b0-4c-b3-38-68"]
 )
-async def test_an_arm_is_found(module: Module, url: str) -> None:
+async def test_an_arm_is_found(module: BleModule, url: str) -> None:
     async with opened(url) as transport:
         assert await ask(transport) == c.GET_POSE.id
         assert (transport.in_flight, transport.window, transport.reorder_window) == (1, 1, 0.0)
 
 
-async def test_an_arm_is_found_by_its_service_alone(module: Module) -> None:
+async def test_an_arm_is_found_by_its_service_alone(module: BleModule) -> None:
     module.name = "bench 3"
     module.advertises_service = True
     async with opened("ble:") as transport:
         assert await ask(transport) == c.GET_POSE.id
 
 
-async def test_a_name_may_come_later_than_the_device(module: Module) -> None:
+async def test_a_name_may_come_later_than_the_device(module: BleModule) -> None:
     module.late_name = 3
     async with opened("ble://WH-BLE 102") as transport:
         assert await ask(transport) == c.GET_POSE.id
 
 
-async def test_the_arm_of_the_address_is_reached_among_others(world: Rig, sim: Simulation) -> None:
+async def test_the_arm_of_the_address_is_reached_among_others(world: BlueZTestbed, sim: Simulation) -> None:
     async with AsyncExitStack() as stack:
         others = [await stack.enter_async_context(simulate()) for _ in range(3)]
         modules = [world.add(each, fast()) for each in (*others[:2], sim, others[2])]
@@ -262,7 +262,7 @@ async def test_the_arm_of_the_address_is_reached_among_others(world: Rig, sim: S
         assert [each.connections for each in modules] == [0, 0, 1, 0]
 
 
-async def test_two_arms_are_looked_for_at_once(world: Rig, module: Module) -> None:
+async def test_two_arms_are_looked_for_at_once(world: BlueZTestbed, module: BleModule) -> None:
     async with simulate() as other:
         second = world.add(other, fast(), name="bench 3")
         async with opened(module.url) as one:
@@ -276,33 +276,33 @@ async def test_two_arms_are_looked_for_at_once(world: Rig, module: Module) -> No
 
 
 @pytest.mark.usefixtures("impatient")
-async def test_nobody_in_range(world: Rig) -> None:
+async def test_nobody_in_range(world: BlueZTestbed) -> None:
     with pytest.raises(ConnectFailed, match=r"no arm was seen, nor any other BLE device; is the arm switched on"):
         await open_transport("ble:", arm="magician")
 
 
 @pytest.mark.usefixtures("impatient")
-async def test_others_in_range_are_named(world: Rig, module: Module) -> None:
+async def test_others_in_range_are_named(world: BlueZTestbed, module: BleModule) -> None:
     module.name = "headphones"
     with pytest.raises(ConnectFailed, match=r"bench 3 was not seen, only 1 other BLE device, such as headphones"):
         await open_transport("ble://bench 3", arm="magician")
 
 
 @pytest.mark.usefixtures("impatient")
-async def test_an_arm_that_a_phone_has_taken_is_not_seen(module: Module) -> None:
+async def test_an_arm_that_a_phone_has_taken_is_not_seen(module: BleModule) -> None:
     module.taken = True
     with pytest.raises(ConnectFailed, match="no phone, other computer or other program connected"):
         await open_transport(module.url, arm="magician")
 
 
-async def test_a_short_timeout_gives_the_same_advice(module: Module) -> None:
+async def test_a_short_timeout_gives_the_same_advice(module: BleModule) -> None:
     module.in_range = False
     with pytest.raises(ConnectFailed, match=r"could not be opened within 0.2 s; no arm was seen.*switched on and near"):
         async with Magician.connect("ble:", timeout=0.2):
             pass
 
 
-async def connect_and_crash(module: Module) -> None:
+async def connect_and_crash(module: BleModule) -> None:
     """Some program connects to the arm, and ends without a word."""
     async with ble_scan.listening() as heard:
         async with asyncio.timeout(IN_TIME):
@@ -320,7 +320,7 @@ async def connect_and_crash(module: Module) -> None:
 
 
 @pytest.mark.parametrize("url", ["ble:", "ble://WH-BLE 102", "ble://D8:B0:4C:B3:38:68"])
-async def test_a_connection_that_a_crash_left_behind_is_taken_over(module: Module, url: str) -> None:
+async def test_a_connection_that_a_crash_left_behind_is_taken_over(module: BleModule, url: str) -> None:
     await connect_and_crash(module)
     async with opened(url) as transport:
         assert await ask(transport) == c.GET_POSE.id
@@ -332,7 +332,7 @@ async def test_a_connection_that_a_crash_left_behind_is_taken_over(module: Modul
 @pytest.mark.usefixtures("impatient")
 @pytest.mark.parametrize("of_ours", [True, False])
 async def test_an_arm_that_another_program_uses_is_left_alone(
-    module: Module, of_ours: bool, monkeypatch: pytest.MonkeyPatch
+    module: BleModule, of_ours: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with opened(module.url) as transport:
         if not of_ours:
@@ -346,7 +346,7 @@ async def test_an_arm_that_another_program_uses_is_left_alone(
 
 
 @pytest.mark.usefixtures("impatient")
-async def test_of_two_at_once_one_gets_the_arm(module: Module) -> None:
+async def test_of_two_at_once_one_gets_the_arm(module: BleModule) -> None:
     openings = (open_transport("ble:", arm="magician") for _ in range(3))
     results = await asyncio.gather(*openings, return_exceptions=True)
     [transport] = [result for result in results if not isinstance(result, BaseException)]
@@ -372,7 +372,7 @@ def test_a_claim_is_of_one_alone() -> None:
     again.drop()
 
 
-async def test_a_change_of_a_connection_is_no_advertisement(module: Module) -> None:
+async def test_a_change_of_a_connection_is_no_advertisement(module: BleModule) -> None:
     async with ble_scan.listening() as heard:
         async with opened(module.url):
             module.lose()
@@ -382,7 +382,7 @@ async def test_a_change_of_a_connection_is_no_advertisement(module: Module) -> N
                 pass
 
 
-async def test_the_free_one_of_two_is_taken(world: Rig, module: Module) -> None:
+async def test_the_free_one_of_two_is_taken(world: BlueZTestbed, module: BleModule) -> None:
     async with simulate() as other:
         async with opened("ble:") as first:
             second = world.add(other, fast())
@@ -396,7 +396,7 @@ async def test_the_free_one_of_two_is_taken(world: Rig, module: Module) -> None:
 
 
 @pytest.mark.parametrize(("mtu", "pieces"), [(23, [20, 18]), (40, [37, 1]), (41, [38]), (247, [38])])
-async def test_a_pose_is_put_together_again(module: Module, mtu: int, pieces: list[int]) -> None:
+async def test_a_pose_is_put_together_again(module: BleModule, mtu: int, pieces: list[int]) -> None:
     module.radio.mtu = mtu
     notified = 0
 
@@ -413,7 +413,7 @@ async def test_a_pose_is_put_together_again(module: Module, mtu: int, pieces: li
 @pytest.mark.parametrize("kind", ["write-without-response", "write"])
 @pytest.mark.parametrize(("mtu", "sizes"), [(23, [20, 3]), (30, [23]), (247, [23])])
 async def test_chunks_are_as_long_as_the_connection_takes(
-    module: Module, sim: Simulation, kind: str, mtu: int, sizes: list[int]
+    module: BleModule, sim: Simulation, kind: str, mtu: int, sizes: list[int]
 ) -> None:
     module.writes = [kind]
     module.radio.mtu = mtu
@@ -425,14 +425,14 @@ async def test_chunks_are_as_long_as_the_connection_takes(
         await until(lambda: bool(sim.arm.executed))
 
 
-async def test_writes_are_without_response_if_both_are_offered(module: Module) -> None:
+async def test_writes_are_without_response_if_both_are_offered(module: BleModule) -> None:
     module.writes = ["write", "write-without-response"]
     async with opened(module.url) as transport:
         await ask(transport)
         assert module.kinds == ["command"]
 
 
-async def test_the_length_of_a_chunk_is_asked_for_each_time(module: Module) -> None:
+async def test_the_length_of_a_chunk_is_asked_for_each_time(module: BleModule) -> None:
     module.radio.mtu = 247
     async with opened(module.url) as transport:
         await transport.send(MOVE)
@@ -446,14 +446,14 @@ async def test_the_length_of_a_chunk_is_asked_for_each_time(module: Module) -> N
 
 @pytest.mark.parametrize("interval", [0.0075, 0.015, 0.03, 0.05])
 @pytest.mark.parametrize("mtu", [23, 247])
-async def test_every_interval(world: Rig, sim: Simulation, interval: float, mtu: int) -> None:
-    module = world.add(sim, Radio(interval=interval, mtu=mtu, packets=1, advertising=0.02))
+async def test_every_interval(world: BlueZTestbed, sim: Simulation, interval: float, mtu: int) -> None:
+    module = world.add(sim, RadioSettings(interval=interval, mtu=mtu, packets=1, advertising=0.02))
     async with opened(module.url) as transport:
         assert [await ask(transport) for _ in range(3)] == [c.GET_POSE.id] * 3
 
 
 @pytest.mark.parametrize("pace", [0.0, 0.01, 0.02])
-async def test_chunks_keep_their_distance(module: Module, pace: float, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_chunks_keep_their_distance(module: BleModule, pace: float, monkeypatch: pytest.MonkeyPatch) -> None:
     times = writes_are_timed(monkeypatch)
     async with opened(f"{module.url}?pace={pace}") as transport:
         for _ in range(3):
@@ -463,7 +463,9 @@ async def test_chunks_keep_their_distance(module: Module, pace: float, monkeypat
         assert min(then - began for (began, _), (then, _) in itertools.pairwise(times)) >= pace - RESOLUTION
 
 
-async def test_the_distance_is_kept_while_the_module_confirms(module: Module, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_the_distance_is_kept_while_the_module_confirms(
+    module: BleModule, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A machine that is busy is late with the next chunk, but not each time."""
     times = writes_are_timed(monkeypatch)
     module.writes = ["write"]
@@ -477,14 +479,14 @@ async def test_the_distance_is_kept_while_the_module_confirms(module: Module, mo
         assert all(then >= confirmed for (_, confirmed), (then, _) in itertools.pairwise(times))
 
 
-async def test_an_answer_says_that_there_is_room(module: Module, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_an_answer_says_that_there_is_room(module: BleModule, monkeypatch: pytest.MonkeyPatch) -> None:
     times = writes_are_timed(monkeypatch)
     async with opened(f"{module.url}?pace=1") as transport:
         while not any(then - began < 0.9 for (began, _), (then, _) in itertools.pairwise(times)):
             await ask(transport)
 
 
-async def test_frames_that_are_sent_at_once_do_not_mix(module: Module, sim: Simulation) -> None:
+async def test_frames_that_are_sent_at_once_do_not_mix(module: BleModule, sim: Simulation) -> None:
     async with opened(module.url) as transport:
         answers = asyncio.create_task(frames(transport, 5))
         await asyncio.gather(*(transport.send(MOVE) for _ in range(5)))
@@ -492,7 +494,7 @@ async def test_frames_that_are_sent_at_once_do_not_mix(module: Module, sim: Simu
         assert b"".join(module.written) == MOVE * 5
 
 
-async def test_a_frame_that_has_begun_is_sent_to_its_end(module: Module) -> None:
+async def test_a_frame_that_has_begun_is_sent_to_its_end(module: BleModule) -> None:
     async with opened(module.url) as transport:
         sending = asyncio.create_task(transport.send(MOVE))
         waiting = asyncio.create_task(transport.send(GET_POSE))
@@ -507,7 +509,7 @@ async def test_a_frame_that_has_begun_is_sent_to_its_end(module: Module) -> None
 
 
 async def test_a_send_on_a_connection_that_takes_nothing_can_be_cancelled(
-    module: Module, monkeypatch: pytest.MonkeyPatch
+    module: BleModule, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loop = asyncio.get_running_loop()
 
@@ -530,7 +532,7 @@ async def test_a_send_on_a_connection_that_takes_nothing_can_be_cancelled(
         assert module.written == []
 
 
-async def test_a_burst_of_notifications_arrives_in_order(module: Module) -> None:
+async def test_a_burst_of_notifications_arrives_in_order(module: BleModule) -> None:
     module.radio.packets = 10_000
     async with opened(module.url) as transport:
         sent = b"".join(number.to_bytes(2, "big") * 10 for number in range(2000))
@@ -542,7 +544,7 @@ async def test_a_burst_of_notifications_arrives_in_order(module: Module) -> None
         assert arrived == sent
 
 
-async def test_equal_notifications_all_arrive(module: Module) -> None:
+async def test_equal_notifications_all_arrive(module: BleModule) -> None:
     async with opened(module.url) as transport:
         module.say(bytes(20 * 20))
         arrived = b""
@@ -565,7 +567,7 @@ async def broken(call: Any, because: str) -> None:
 
 
 @pytest.mark.parametrize("step", ["connect", "connected", "resolved", "start_notify"])
-async def test_a_connection_that_breaks_while_it_is_made_is_made_again(module: Module, step: str) -> None:
+async def test_a_connection_that_breaks_while_it_is_made_is_made_again(module: BleModule, step: str) -> None:
     module.watch = once(step, module.lose)
     async with opened("ble:") as transport:
         assert await ask(transport) == c.GET_POSE.id
@@ -573,7 +575,7 @@ async def test_a_connection_that_breaks_while_it_is_made_is_made_again(module: M
 
 @pytest.mark.parametrize("step", ["connect", "connected", "resolved", "start_notify"])
 @pytest.mark.usefixtures("impatient")
-async def test_one_that_always_breaks_is_given_up(module: Module, step: str) -> None:
+async def test_one_that_always_breaks_is_given_up(module: BleModule, step: str) -> None:
     module.watch = lambda taken: module.lose() if taken == step else None
     with pytest.raises(ConnectFailed, match="is the arm near"):
         await open_transport("ble:", arm="magician")
@@ -583,7 +585,7 @@ async def test_one_that_always_breaks_is_given_up(module: Module, step: str) -> 
 
 @pytest.mark.parametrize("kind", ["write-without-response", "write"])
 @pytest.mark.parametrize(("step", "number"), [("write", 0), ("write", 1), ("arrive", 0), ("arrive", 1)])
-async def test_a_break_in_the_middle_of_a_frame(module: Module, kind: str, step: str, number: int) -> None:
+async def test_a_break_in_the_middle_of_a_frame(module: BleModule, kind: str, step: str, number: int) -> None:
     module.writes = [kind]
     async with opened(module.url) as transport:
         module.watch = once(step, module.lose, number)
@@ -594,7 +596,7 @@ async def test_a_break_in_the_middle_of_a_frame(module: Module, kind: str, step:
         await broken(transport.send(GET_POSE), "")
 
 
-async def test_a_break_in_the_middle_of_an_answer(module: Module) -> None:
+async def test_a_break_in_the_middle_of_an_answer(module: BleModule) -> None:
     async with opened(module.url) as transport:
         module.watch = once("notify", module.lose, 1)
         await transport.send(GET_POSE)
@@ -602,7 +604,7 @@ async def test_a_break_in_the_middle_of_an_answer(module: Module) -> None:
         await broken(transport.send(GET_POSE), "the arm's BLE module has disconnected")
 
 
-async def test_a_break_in_idleness(module: Module) -> None:
+async def test_a_break_in_idleness(module: BleModule) -> None:
     async with opened(module.url) as transport:
         waiting = asyncio.create_task(transport.receive())
         await asyncio.sleep(0)
@@ -610,7 +612,7 @@ async def test_a_break_in_idleness(module: Module) -> None:
         await broken(waiting, "the arm's BLE module has disconnected")
 
 
-async def test_what_has_arrived_before_the_break_is_not_lost(module: Module) -> None:
+async def test_what_has_arrived_before_the_break_is_not_lost(module: BleModule) -> None:
     async with opened(module.url) as transport:
         module.say(b"last words")
         await until(lambda: bool(transport._buffer))  # type: ignore[attr-defined]
@@ -620,7 +622,7 @@ async def test_what_has_arrived_before_the_break_is_not_lost(module: Module) -> 
         await broken(transport.receive(), "")
 
 
-async def test_closed_is_closed(module: Module) -> None:
+async def test_closed_is_closed(module: BleModule) -> None:
     async with opened(module.url) as transport:
         waiting = asyncio.create_task(transport.receive())
         await asyncio.sleep(0)
@@ -634,7 +636,7 @@ async def test_closed_is_closed(module: Module) -> None:
 
 
 @pytest.mark.parametrize("drop", [True, False])
-async def test_ten_connections_leak_nothing(module: Module, drop: bool) -> None:
+async def test_ten_connections_leak_nothing(module: BleModule, drop: bool) -> None:
     counts = []
     for _ in range(10):
         async with opened(module.url) as transport:
@@ -650,7 +652,7 @@ async def test_ten_connections_leak_nothing(module: Module, drop: bool) -> None:
 
 
 async def test_a_write_that_never_comes_back_ends_the_connection(
-    module: Module, monkeypatch: pytest.MonkeyPatch
+    module: BleModule, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with opened(module.url) as transport:
         monkeypatch.setattr(ble, "GATT", 0.1)
@@ -660,7 +662,7 @@ async def test_a_write_that_never_comes_back_ends_the_connection(
 
 
 async def test_a_length_that_nobody_can_tell_any_more_ends_the_connection(
-    module: Module, monkeypatch: pytest.MonkeyPatch
+    module: BleModule, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def gone(_: BleakGATTCharacteristic) -> int:
         raise AttributeError("max_pdu_size")  # as on Windows, of a connection that has just ended
@@ -671,14 +673,14 @@ async def test_a_length_that_nobody_can_tell_any_more_ends_the_connection(
         await broken(transport.receive(), "max_pdu_size")
 
 
-async def test_a_device_that_is_forgotten_ends_with_the_next_write(module: Module) -> None:
+async def test_a_device_that_is_forgotten_ends_with_the_next_write(module: BleModule) -> None:
     async with opened(module.url) as transport:
         module.vanish()
         await broken(transport.send(GET_POSE), "UnknownObject")
         await broken(transport.receive(), "UnknownObject")
 
 
-async def test_a_service_that_dies_ends_it_with_the_next_write(world: Rig, module: Module) -> None:
+async def test_a_service_that_dies_ends_it_with_the_next_write(world: BlueZTestbed, module: BleModule) -> None:
     async with opened(module.url) as transport:
         assert await ask(transport) == c.GET_POSE.id
         await world.stop()
@@ -693,7 +695,7 @@ async def test_a_service_that_dies_ends_it_with_the_next_write(world: Rig, modul
         assert await ask(transport) == c.GET_POSE.id
 
 
-async def test_a_bus_that_dies_ends_it(world: Rig, module: Module) -> None:
+async def test_a_bus_that_dies_ends_it(world: BlueZTestbed, module: BleModule) -> None:
     async with opened(module.url) as transport:
         assert await ask(transport) == c.GET_POSE.id
         await world.kill_bus()
@@ -704,7 +706,7 @@ async def test_a_bus_that_dies_ends_it(world: Rig, module: Module) -> None:
         await open_transport(module.url, arm="magician")
 
 
-async def test_an_adapter_that_is_switched_off(world: Rig, module: Module) -> None:
+async def test_an_adapter_that_is_switched_off(world: BlueZTestbed, module: BleModule) -> None:
     assert world.bluez
     async with opened(module.url) as transport:
         world.bluez.power(on=False)
@@ -722,7 +724,7 @@ async def test_an_adapter_that_is_switched_off(world: Rig, module: Module) -> No
 
 @pytest.mark.parametrize("member", ["GetManagedObjects", "StartDiscovery", "StopDiscovery"])
 async def test_a_service_that_hangs_is_not_waited_for(
-    module: Module, monkeypatch: pytest.MonkeyPatch, member: str
+    module: BleModule, monkeypatch: pytest.MonkeyPatch, member: str
 ) -> None:
     monkeypatch.setattr(ble_scan, "PATIENCE", 0.1)
     for called in [called for called in bluez.HANDLERS if called[1] == member]:
@@ -737,7 +739,7 @@ async def test_a_service_that_hangs_is_not_waited_for(
             await open_transport(module.url, arm="magician")
 
 
-async def test_an_adapter_that_is_not_there(module: Module) -> None:
+async def test_an_adapter_that_is_not_there(module: BleModule) -> None:
     with pytest.raises(ConnectFailed, match="no such Bluetooth adapter"):
         await open_transport("ble:?adapter=hci7", arm="magician")
 
@@ -750,7 +752,7 @@ async def test_no_bus_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("impatient")
-async def test_somebody_without_the_service_is_no_arm(module: Module) -> None:
+async def test_somebody_without_the_service_is_no_arm(module: BleModule) -> None:
     module.services = False
     with pytest.raises(ConnectFailed, match="has not the service of the arm's BLE module"):
         await open_transport(module.url, arm="magician")
@@ -763,7 +765,7 @@ async def test_somebody_without_the_service_is_no_arm(module: Module) -> None:
 
 @pytest.mark.parametrize("step", ["connect", "connected", "resolved", "start_notify"])
 @pytest.mark.parametrize("native", [True, False])
-async def test_an_opening_that_is_cancelled_leaves_nothing(module: Module, step: str, native: bool) -> None:
+async def test_an_opening_that_is_cancelled_leaves_nothing(module: BleModule, step: str, native: bool) -> None:
     module.disconnecting = 0.02
     if native:
         opening = asyncio.create_task(open_transport(module.url, arm="magician"))
@@ -784,7 +786,7 @@ async def test_an_opening_that_is_cancelled_leaves_nothing(module: Module, step:
 
 
 async def test_an_arm_that_is_found_when_nobody_wants_it_any_more_is_free(
-    module: Module, monkeypatch: pytest.MonkeyPatch
+    module: BleModule, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opening = asyncio.create_task(open_transport(module.url, arm="magician"))
     stop = bluez.HANDLERS[ADAPTER, "StopDiscovery"]
@@ -804,7 +806,7 @@ async def test_an_arm_that_is_found_when_nobody_wants_it_any_more_is_free(
 
 
 async def test_a_question_for_the_version_that_is_cancelled_is_no_obstacle_later(
-    module: Module, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    module: BleModule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = tmp_path / "asked"
     tool = tmp_path / "bluetoothctl"
@@ -823,7 +825,7 @@ async def test_a_question_for_the_version_that_is_cancelled_is_no_obstacle_later
         assert await ask(transport) == c.GET_POSE.id
 
 
-async def test_a_slow_end_is_waited_for(module: Module) -> None:
+async def test_a_slow_end_is_waited_for(module: BleModule) -> None:
     module.disconnecting = 0.2
     async with opened(module.url):
         pass
@@ -831,7 +833,7 @@ async def test_a_slow_end_is_waited_for(module: Module) -> None:
     assert not module.connected
 
 
-async def test_a_close_that_is_cancelled_goes_on(module: Module) -> None:
+async def test_a_close_that_is_cancelled_goes_on(module: BleModule) -> None:
     module.disconnecting = 0.1
     async with opened(module.url) as transport:
         with anyio.move_on_after(0.01):
@@ -842,7 +844,9 @@ async def test_a_close_that_is_cancelled_goes_on(module: Module) -> None:
         assert not module.connected
 
 
-async def test_a_service_that_hangs_does_not_hold_up_the_end(module: Module, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_service_that_hangs_does_not_hold_up_the_end(
+    module: BleModule, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(ble, "DISCONNECT", 0.1)
     async with opened(module.url):
         module.disconnecting = 3600.0
@@ -947,15 +951,17 @@ async def test_a_call_ends_with_its_time_or_with_what_it_is_for() -> None:
 @pytest.mark.parametrize(
     ("radio", "request_bytes", "reply_bytes", "pace", "events"),
     [
-        (Radio(interval=0.03), 6, 38, 0.02, 2),
-        (Radio(interval=0.03, packets=1), 6, 38, 0.02, 3),
-        (Radio(interval=0.03), 23, 14, 0.02, 2),
-        (Radio(interval=0.03, packets=1), 23, 14, 0.0, 3),
-        (Radio(interval=0.0075), 23, 14, 0.02, 4),
-        (Radio(interval=0.0075, mtu=247), 23, 14, 0.02, 2),
+        (RadioSettings(interval=0.03), 6, 38, 0.02, 2),
+        (RadioSettings(interval=0.03, packets=1), 6, 38, 0.02, 3),
+        (RadioSettings(interval=0.03), 23, 14, 0.02, 2),
+        (RadioSettings(interval=0.03, packets=1), 23, 14, 0.0, 3),
+        (RadioSettings(interval=0.0075), 23, 14, 0.02, 4),
+        (RadioSettings(interval=0.0075, mtu=247), 23, 14, 0.02, 2),
     ],
 )
-def test_the_least_round_trip(radio: Radio, request_bytes: int, reply_bytes: int, pace: float, events: int) -> None:
+def test_the_least_round_trip(
+    radio: RadioSettings, request_bytes: int, reply_bytes: int, pace: float, events: int
+) -> None:
     assert round_trip(radio, request_bytes, reply_bytes, pace) == pytest.approx(events * radio.interval)
 
 
@@ -964,7 +970,7 @@ def test_the_least_round_trip(radio: Radio, request_bytes: int, reply_bytes: int
 )
 def test_a_radio_that_cannot_be(details: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"is 0.0075 to 4 s|expected an mtu"):
-        Radio(**details)
+        RadioSettings(**details)
 
 
 class SlowSelector(selectors.SelectSelector):
@@ -992,7 +998,7 @@ class SlowMotion(asyncio.SelectorEventLoop):
 )
 def test_round_trips_are_as_short_as_the_radio_lets_them_be(request_: bytes, mtu: int, pace: float) -> None:
     """However busy the machine is, some are; if the driver misses an event by itself, none is."""
-    radio = Radio(interval=FAST, mtu=mtu)
+    radio = RadioSettings(interval=FAST, mtu=mtu)
 
     async def measure() -> None:
         loop = asyncio.get_running_loop()
@@ -1062,7 +1068,7 @@ async def test_a_whole_cycle_is_the_same_as_in_memory() -> None:
         assert there.link.stats.repeated == 0 or there.link.stats.repeated < there.link.stats.sent / 2
 
 
-async def test_a_program_that_fails_stops_the_arm(module: Module, sim: Simulation) -> None:
+async def test_a_program_that_fails_stops_the_arm(module: BleModule, sim: Simulation) -> None:
     with pytest.raises(RuntimeError, match="mine"):
         async with Magician.connect(module.url) as arm:
             await arm.set_speed(0.01)
@@ -1075,14 +1081,14 @@ async def test_a_program_that_fails_stops_the_arm(module: Module, sim: Simulatio
     assert not sim.arm.laser
 
 
-async def test_without_reconnect_a_break_is_the_end(module: Module) -> None:
+async def test_without_reconnect_a_break_is_the_end(module: BleModule) -> None:
     with pytest.raises(ConnectionLost, match="the arm's BLE module has disconnected"):
         async with Magician.connect(module.url) as arm:
             module.lose()
             await arm.get_pose()
 
 
-async def test_motions_resolve_after_an_outage(module: Module, sim: Simulation) -> None:
+async def test_motions_resolve_after_an_outage(module: BleModule, sim: Simulation) -> None:
     async with Magician.connect(module.url, reconnect=True) as arm:
         motions = [await arm.queue.move_to(200 + step, 40 * (-1) ** step, 40) for step in range(6)]
         module.lose()
@@ -1096,7 +1102,7 @@ async def test_motions_resolve_after_an_outage(module: Module, sim: Simulation) 
 
 @pytest.mark.parametrize(("step", "number"), [("write", 0), ("write", 1), ("arrive", 0), ("arrive", 1), ("notify", 0)])
 async def test_no_motion_is_lost_or_doubled_wherever_the_link_breaks(
-    module: Module, sim: Simulation, step: str, number: int
+    module: BleModule, sim: Simulation, step: str, number: int
 ) -> None:
     async with asyncio.timeout(IN_TIME), Magician.connect(module.url, reconnect=True) as arm:
         await arm.move_to(210, 0, 40)
@@ -1108,7 +1114,7 @@ async def test_no_motion_is_lost_or_doubled_wherever_the_link_breaks(
 
 
 @pytest.mark.parametrize("seed", range(2))
-async def test_a_link_that_breaks_again_and_again(module: Module, sim: Simulation, seed: int) -> None:
+async def test_a_link_that_breaks_again_and_again(module: BleModule, sim: Simulation, seed: int) -> None:
     """Forty motions, and a break after every few steps on the way, whatever they are."""
     random = Random(seed)
     left = [20]
@@ -1130,7 +1136,7 @@ async def test_a_link_that_breaks_again_and_again(module: Module, sim: Simulatio
         assert arm.link.outages > 2
 
 
-async def test_ten_outages(module: Module, sim: Simulation) -> None:
+async def test_ten_outages(module: BleModule, sim: Simulation) -> None:
     async with asyncio.timeout(IN_TIME), Magician.connect(module.url, reconnect=True) as arm:
         motion = await arm.queue.move_to(220, 60, 40)
         for _ in range(10):
@@ -1142,7 +1148,7 @@ async def test_ten_outages(module: Module, sim: Simulation) -> None:
         assert arm.link.outages == 10
 
 
-async def test_an_arm_that_was_switched_off_is_recognised(world: Rig) -> None:
+async def test_an_arm_that_was_switched_off_is_recognised(world: BlueZTestbed) -> None:
     loop, jumped = asyncio.get_running_loop(), [0.0]
     async with simulate(clock=lambda: loop.time() + jumped[0]) as sim:
         module = world.add(sim, fast())
@@ -1158,7 +1164,9 @@ async def test_an_arm_that_was_switched_off_is_recognised(world: Rig) -> None:
             assert [outcome for outcome, _ in executed(sim)] == ["aborted"]
 
 
-async def test_the_arm_goes_on_when_the_service_comes_back(world: Rig, module: Module, sim: Simulation) -> None:
+async def test_the_arm_goes_on_when_the_service_comes_back(
+    world: BlueZTestbed, module: BleModule, sim: Simulation
+) -> None:
     async with asyncio.timeout(IN_TIME), Magician.connect(module.url, reconnect=True) as arm:
         motion = await arm.queue.move_to(220, 60, 40)
         await world.stop()
@@ -1170,7 +1178,9 @@ async def test_the_arm_goes_on_when_the_service_comes_back(world: Rig, module: M
         assert targets(sim) == [220]
 
 
-async def test_the_same_arm_is_reached_again_and_no_other_one(world: Rig, module: Module, sim: Simulation) -> None:
+async def test_the_same_arm_is_reached_again_and_no_other_one(
+    world: BlueZTestbed, module: BleModule, sim: Simulation
+) -> None:
     service = world.bluez
     assert service
     async with simulate() as other, asyncio.timeout(IN_TIME):

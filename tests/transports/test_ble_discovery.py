@@ -20,9 +20,9 @@ from dobot_async.simulator import Simulation, simulate
 if sys.platform != "linux":
     pytest.skip("BlueZ is Linux's", allow_module_level=True)
 
-from dobot_async.simulator.ble.link_layer import Radio
-from dobot_async.simulator.ble.module import Module
-from dobot_async.simulator.ble.testbed import Rig, rig
+from dobot_async.simulator.ble.link_layer import RadioSettings
+from dobot_async.simulator.ble.module import BleModule
+from dobot_async.simulator.ble.testbed import BlueZTestbed, rig
 
 if not shutil.which("dbus-daemon") and not os.environ.get("DOBOT_REQUIRE_DBUS"):
     pytest.skip("dbus-daemon is not installed (Debian: apt install dbus-daemon)", allow_module_level=True)
@@ -32,7 +32,7 @@ LONG = 60.0
 
 
 @pytest.fixture
-async def world() -> AsyncIterator[Rig]:
+async def world() -> AsyncIterator[BlueZTestbed]:
     """A bus with BlueZ on it."""
     async with rig() as made:
         yield made
@@ -45,9 +45,9 @@ async def sims() -> AsyncIterator[list[Simulation]]:
         yield [await stack.enter_async_context(simulate(speed=50)) for _ in range(2)]
 
 
-def module(world: Rig, sim: Simulation, number: int, name: str = "WH-BLE 102") -> Module:
+def module(world: BlueZTestbed, sim: Simulation, number: int, name: str = "WH-BLE 102") -> BleModule:
     """Gives an arm a module on a good connection."""
-    radio = Radio(interval=0.0075, advertising=0.02)
+    radio = RadioSettings(interval=0.0075, advertising=0.02)
     return world.add(sim, radio, name=name, address=ADDRESS(number))
 
 
@@ -63,7 +63,7 @@ async def first(count: int) -> list[Found]:
     return found
 
 
-async def test_modules_are_known_by_name_or_service(world: Rig, sims: list[Simulation]) -> None:
+async def test_modules_are_known_by_name_or_service(world: BlueZTestbed, sims: list[Simulation]) -> None:
     module(world, sims[0], 1, name="Headphones")
     module(world, sims[0], 2, name="My USR-BLE100 here")
     module(world, sims[1], 3, name="lab").advertises_service = True
@@ -71,7 +71,7 @@ async def test_modules_are_known_by_name_or_service(world: Rig, sims: list[Simul
     assert found == {f"ble://{ADDRESS(2)}": "My USR-BLE100 here", f"ble://{ADDRESS(3)}": "lab"}
 
 
-async def test_a_name_that_comes_later_is_told(world: Rig, sims: list[Simulation]) -> None:
+async def test_a_name_that_comes_later_is_told(world: BlueZTestbed, sims: list[Simulation]) -> None:
     late = module(world, sims[0], 1)
     late.advertises_service = True
     late.late_name = 3
@@ -80,7 +80,7 @@ async def test_a_name_that_comes_later_is_told(world: Rig, sims: list[Simulation
     assert (named.identity, named.description) == (ADDRESS(1), "WH-BLE 102")
 
 
-async def test_an_arm_that_is_in_use_here_is_told_too(world: Rig, sims: list[Simulation]) -> None:
+async def test_an_arm_that_is_in_use_here_is_told_too(world: BlueZTestbed, sims: list[Simulation]) -> None:
     used = module(world, sims[0], 1)
     async with Magician.connect(used.url) as arm:
         (found,) = await first(1)
@@ -88,7 +88,7 @@ async def test_an_arm_that_is_in_use_here_is_told_too(world: Rig, sims: list[Sim
         await arm.get_pose()
 
 
-async def test_a_probe_connects_to_one_after_the_other(world: Rig, sims: list[Simulation]) -> None:
+async def test_a_probe_connects_to_one_after_the_other(world: BlueZTestbed, sims: list[Simulation]) -> None:
     modules = [module(world, sim, number) for number, sim in enumerate(sims)]
     found = [each async for each in discover(sources=["ble"], timeout=2, probe=True, probe_timeout=LONG)]
     assert [each.url for each in found] == [each.url for each in modules]
@@ -97,7 +97,7 @@ async def test_a_probe_connects_to_one_after_the_other(world: Rig, sims: list[Si
     assert not any(each.connected for each in modules)
 
 
-async def test_the_scan_ends_with_the_search(world: Rig, sims: list[Simulation]) -> None:
+async def test_the_scan_ends_with_the_search(world: BlueZTestbed, sims: list[Simulation]) -> None:
     module(world, sims[0], 1)
     assert world.bluez
     async with aclosing(BLEModules().search(LONG)) as search:
@@ -107,7 +107,7 @@ async def test_the_scan_ends_with_the_search(world: Rig, sims: list[Simulation])
     assert not world.bluez.scanning
 
 
-async def test_an_adapter_that_is_off_is_a_problem_with_advice(world: Rig) -> None:
+async def test_an_adapter_that_is_off_is_a_problem_with_advice(world: BlueZTestbed) -> None:
     assert world.bluez
     world.bluez.power(on=False)
     problems: list[DiscoveryProblem] = []

@@ -12,7 +12,7 @@ import pytest
 
 from dobot_async import ConnectFailed
 from dobot_async.transports import open_transport
-from dobot_async.transports.zenoh.config import GONE, Place, address
+from dobot_async.transports.zenoh.config import GONE, ZenohConfig, address
 
 LEASE = "transport/link/tx/lease"
 
@@ -24,7 +24,7 @@ def no_configuration(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def settings(query: str, *, serving: bool) -> dict[str, Any]:
     """What matters of the configuration of a URL."""
-    config = Place.of(urlsplit(f"zenoh://left{query}"), serving=serving).configuration(serving=serving)
+    config = ZenohConfig.of(urlsplit(f"zenoh://left{query}"), serving=serving).configuration(serving=serving)
     keys = ("mode", "listen/endpoints", "connect/endpoints", "scouting/multicast/enabled", "scouting/gossip/enabled")
     return {
         key.split("/")[0] if "scouting" not in key else key.split("/")[1]: json.loads(config.get_json(key))
@@ -75,5 +75,5 @@ async def test_without_the_package_the_message_says_what_to_install(monkeypatch:
 def test_who_is_gone_is_noticed_soon_unless_a_file_says_otherwise(tmp_path: Path) -> None:
     file = tmp_path / "slow.json5"
     file.write_text(json.dumps({"transport": {"unicast": {"open_timeout": 7000}}}))
-    found = Place.of(urlsplit(f"zenoh://left?config={file}"), serving=False).configuration(serving=False)
+    found = ZenohConfig.of(urlsplit(f"zenoh://left?config={file}"), serving=False).configuration(serving=False)
     assert [json.loads(found.get_json(key)) for key in GONE] == [7000, 1500, 1_500_000]

@@ -10,8 +10,8 @@ import anyio
 import pytest
 
 from dobot_async.transports.zenoh import messages as zenoh_messages
-from dobot_async.transports.zenoh.config import Place
-from dobot_async.transports.zenoh.messages import HEADER, Outbox
+from dobot_async.transports.zenoh.config import ZenohConfig
+from dobot_async.transports.zenoh.messages import HEADER, SendQueue
 from dobot_async.transports.zenoh.transport import ZenohTransport
 
 pytest.importorskip("zenoh")
@@ -26,8 +26,8 @@ async def test_a_send_never_waits_and_what_is_sent_is_whole(monkeypatch: pytest.
         takes.wait()
         taken.append(message)
 
-    transport = ZenohTransport(Place.of(urlsplit("zenoh://arm"), serving=False))
-    transport._up = Outbox(put, lambda why: transport._break(ConnectionResetError(why)), "test")
+    transport = ZenohTransport(ZenohConfig.of(urlsplit("zenoh://arm"), serving=False))
+    transport._up = SendQueue(put, lambda why: transport._break(ConnectionResetError(why)), "test")
     for number in range(10):
         sending = asyncio.create_task(transport.send(bytes((number,)) * 100))
         if number % 2:

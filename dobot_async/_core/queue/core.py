@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.executor import Executor, alarmed, in_motions, unseen
-from dobot_async._core.queue.motion import Motion, Outbox
+from dobot_async._core.queue.motion import Motion, MotionOutbox
 from dobot_async._core.queue.poller import StatusPoller
 from dobot_async._core.queue.stopper import Stopper
 from dobot_async._core.queue.writer import Writer
@@ -51,7 +51,7 @@ class QueueCore:
         self.outcomes: Counter[str] = Counter()
         self._executor = executor
         executor.on_unknown.add(self.give_up)
-        self._outbox = Outbox(self._accepted)
+        self._outbox = MotionOutbox(self._accepted)
         self._pending: deque[Motion] = deque()
         self._poller = StatusPoller(self)
         self._writer = Writer(executor, self._outbox, self._poller, self)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dobot_async._core.queue.keeper import Keeper
     from dobot_async._core.queue.motion import Motion
 
-__all__ = ["Entry", "Executor", "Source", "alarmed", "in_motions", "unseen"]
+__all__ = ["Entry", "Executor", "MotionSource", "alarmed", "in_motions", "unseen"]
 
 Q = TypeVar("Q")
 
@@ -29,7 +29,7 @@ class Entry:
     frame: Any
 
 
-class Source(Protocol):
+class MotionSource(Protocol):
     """Where an executor gets the commands from, in order."""
 
     def __len__(self) -> int:
@@ -74,7 +74,7 @@ class Executor(Protocol):
         """
         ...
 
-    async def submit(self, source: Source) -> None:
+    async def submit(self, source: MotionSource) -> None:
         """Give commands to the arm, each exactly once and in order, until the source is empty; wait for room.
 
         Raises:

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol, TypeVar
 
 from dobot_async._core.protocol.wire import Command
-from dobot_async._core.queue.executor import Entry, Source, unseen
+from dobot_async._core.queue.executor import Entry, MotionSource, unseen
 from dobot_async._core.queue.keeper import Keeper
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
@@ -100,7 +100,7 @@ class HostExecutor:
         """Return a checked entry."""
         return self._runner.prepare(command, value)
 
-    async def submit(self, source: Source) -> None:
+    async def submit(self, source: MotionSource) -> None:
         """Take commands while there is room for them."""
         while source:
             if len(self._waiting) >= self._capacity:

@@ -12,7 +12,7 @@ from dobot_async._core.queue.executor import Entry
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout, another
 
-__all__ = ["WITHDRAWN", "Motion", "Outbox"]
+__all__ = ["WITHDRAWN", "Motion", "MotionOutbox"]
 
 
 class Watcher(Protocol):
@@ -135,7 +135,7 @@ LOOKED_AT = 1.0
 """Seconds for which the arm is asked after somebody has looked whether a Motion is done."""
 
 
-class Outbox:
+class MotionOutbox:
     """What was put and has not been accepted: it waits, or was taken by the executor and is on its way.
 
     Args:

@@ -30,7 +30,7 @@ ALARMS = 0.2  # seconds after which the alarms are read as well, for a motion th
 UNWATCHED = 100  # Motions that may be pending although nobody awaits one; beyond, the arm is asked all the same
 
 
-class Watched(Protocol):
+class WatchedMotion(Protocol):
     """The queue, as far as the poller is concerned."""
 
     @property
@@ -57,7 +57,7 @@ class Watched(Protocol):
 class StatusPoller:
     """Lives while somebody waits, or has just looked, or so much is pending that it would fill the memory."""
 
-    def __init__(self, queue: Watched) -> None:
+    def __init__(self, queue: WatchedMotion) -> None:
         self._queue = queue
         self._watchers = 0
         self._until = -math.inf

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.executor import Executor
-from dobot_async._core.queue.motion import Outbox
+from dobot_async._core.queue.motion import MotionOutbox
 from dobot_async._core.queue.poller import StatusPoller
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.errors import (
@@ -43,7 +43,7 @@ class Written(Protocol):
 class Writer:
     """Gives what is in the outbox to the executor."""
 
-    def __init__(self, executor: Executor, outbox: Outbox, poller: StatusPoller, queue: Written) -> None:
+    def __init__(self, executor: Executor, outbox: MotionOutbox, poller: StatusPoller, queue: Written) -> None:
         self._executor = executor
         self._outbox = outbox
         self._poller = poller

@@ -24,7 +24,7 @@ from dobot_async.arms.magician.arguments import to_choice, to_flag
 from dobot_async.arms.magician.executor import MagicianExecutor
 from dobot_async.arms.magician.following import MagicianFollowing
 from dobot_async.arms.magician.goals import Need, Plan
-from dobot_async.arms.magician.hand import Led
+from dobot_async.arms.magician.hand import HandGuided
 from dobot_async.arms.magician.jogs import Jog
 from dobot_async.arms.magician.keeping import MagicianKeeper, Stand, check_jog
 from dobot_async.arms.magician.kinematics import Joints, Kinematics
@@ -47,7 +47,7 @@ Q = TypeVar("Q")
 R = TypeVar("R")
 
 
-class Magician(Readings, Sensors, Led, Verbs[Coroutine[Any, Any, None]]):
+class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
     """A Dobot Magician; made by `connect`. Each verb returns when the arm has done it.
 
     A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.

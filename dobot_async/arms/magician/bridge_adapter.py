@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from dobot_async._core.protocol.contract import Parser
 from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.protocol.wire import Command, Number, Queueing, u64
-from dobot_async.arms.bridge_adapter import ByKey, Kind, Reading, Switch
+from dobot_async.arms.bridge_adapter import ByKey, RequestKind, Switch, TelemetryRead
 from dobot_async.arms.magician import alarms
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician import frame as f
@@ -158,7 +158,7 @@ def told_index(reply: Frame) -> dict[str, Any]:
 
 
 class BridgedMagician(ByKey[Frame]):
-    """See `dobot_async.arms.bridge_adapter.Bridged`."""
+    """See `dobot_async.arms.bridge_adapter.BridgeAdapter`."""
 
     model = "magician"
     header = f.HEADER
@@ -169,9 +169,9 @@ class BridgedMagician(ByKey[Frame]):
     barriers = tuple(f.request(row, b"", queued=False) for row in BARRIERS)
     stopping = tuple(f.request(row, row.request.encode(value), queued=False) for row, value in LEAVING)
     readings = {  # noqa: RUF012 - a table
-        "pose": Reading(f.request(c.GET_POSE, b"", queued=False), 0.2, told_pose),
-        "motion": Reading(MagicianWatch().question, 0.2, told_index),
-        "alarms": Reading(f.request(c.GET_ALARMS_STATE, b"", queued=False), 1.0, told_alarms),
+        "pose": TelemetryRead(f.request(c.GET_POSE, b"", queued=False), 0.2, told_pose),
+        "motion": TelemetryRead(MagicianWatch().question, 0.2, told_index),
+        "alarms": TelemetryRead(f.request(c.GET_ALARMS_STATE, b"", queued=False), 1.0, told_alarms),
     }
     denials = {  # noqa: RUF012 - a table
         "wifi": frozenset(range(150, 158)),
@@ -193,18 +193,18 @@ class BridgedMagician(ByKey[Frame]):
         """Returns what follows one program."""
         return MagicianWatch()
 
-    def kind(self, request: Frame) -> Kind:
+    def kind(self, request: Frame) -> RequestKind:
         """Returns what a request is."""
         now = request.write and not request.queued
         ends_jog = request.id == c.SET_JOG_CMD.id and request.params[1:] == IDLE
         if request.id in STOPS or (now and ends_jog):
-            return Kind.STOP
+            return RequestKind.STOP
 
         if now and (request.id, request.params) in TOOLS_OFF:
-            return Kind.OFF
+            return RequestKind.OFF
 
         known = (request.id, False) in c.BY_KEY or request.id in LITE_READS
-        return Kind.READ if known and not request.write and not request.queued else Kind.WRITE
+        return RequestKind.READ if known and not request.write and not request.queued else RequestKind.WRITE
 
     def name(self, request: Frame) -> str:
         """Returns the manual's name; nothing of the parameters, one of which is a password."""
@@ -220,7 +220,7 @@ class BridgedMagician(ByKey[Frame]):
         """Returns whether it does no harm to send it again: never for what moves anything."""
         row = row_of(request)
         if row is None or request.queued or row.moves or row.id in MOTORS:
-            return self.kind(request) in {Kind.STOP, Kind.OFF}
+            return self.kind(request) in {RequestKind.STOP, RequestKind.OFF}
 
         return row.repeatable
 

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.wire import Command
-from dobot_async._core.queue.executor import Entry, Source
+from dobot_async._core.queue.executor import Entry, MotionSource
 from dobot_async._core.util.tasks import run_concurrently
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.arrival import Approach
@@ -107,7 +107,7 @@ class MagicianExecutor(Submission):
         """Let the arm go on. Manual 2.19.1."""
         await self._control(c.SET_QUEUED_CMD_START_EXEC, SILENCE)
 
-    async def download(self, source: Source, loops: int) -> None:
+    async def download(self, source: MotionSource, loops: int) -> None:
         """Store the commands of a source in the arm's flash as a program; see `end_download`. Manual 2.19.4."""
         await self._await_room()
         self._downloading = True

@@ -12,14 +12,14 @@ from typing import Any, Literal, SupportsFloat
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.queue.executor import alarmed
-from dobot_async._core.queue.motion import Motion, Outbox
+from dobot_async._core.queue.motion import Motion, MotionOutbox
 from dobot_async._core.util.arguments import check_choice
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.executor import MagicianExecutor
 from dobot_async.arms.magician.frame import Frame
 from dobot_async.arms.magician.queue import MagicianQueue
 from dobot_async.arms.magician.status import SILENCE
-from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, Look, Point, follow_target
+from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, FollowStatus, TargetPoint, follow_target
 
 __all__ = ["MagicianFollowing"]
 
@@ -89,7 +89,7 @@ class Led:
         self._queue = queue
         self._go = self._replace if way == "replace" else self._clear_and_go
 
-    def allow(self, point: Point) -> None:
+    def allow(self, point: TargetPoint) -> None:
         """Raise Unreachable, with the reason, for a place where the arm cannot go."""
         kinematics = self._queue.kinematics
         if point.joints:
@@ -102,17 +102,17 @@ class Led:
         await self._executor.status.remember()
         await self.check()
 
-    async def look(self, *, joints: bool) -> Look:
+    async def look(self, *, joints: bool) -> FollowStatus:
         """Read the pose. Manual 2.4.1."""
         pose = await self._executor.status.ask(c.GET_POSE)
         numbers = pose.joints if joints else (pose.x, pose.y, pose.z, pose.r)
-        return Look(Point(tuple(numbers), joints))
+        return FollowStatus(TargetPoint(tuple(numbers), joints))
 
-    def within(self, look: Look, point: Point) -> Point:  # noqa: ARG002 - such a motion can be replaced at any time
+    def within(self, look: FollowStatus, point: TargetPoint) -> TargetPoint:  # noqa: ARG002 - such a motion can be replaced at any time
         """Return the place: a stop ends the way to it at once."""
         return point
 
-    async def go(self, point: Point) -> bool:
+    async def go(self, point: TargetPoint) -> bool:
         """Send the arm there. Manual 2.11.5."""
         x, y, z, r = point.numbers
         return await self._go(c.PTPCmd(MODES[point.joints], x, y, z, r))
@@ -136,7 +136,7 @@ class Led:
     async def _clear_and_go(self, value: c.PTPCmd) -> bool:
         """Throw away what goes on, and queue it."""
         await self._executor.clear()
-        outbox = Outbox(lambda _: None)
+        outbox = MotionOutbox(lambda _: None)
         outbox.add([Motion(self._queue, self._executor.prepare(c.SET_PTP_CMD, value))])
         await self._executor.submit(outbox)
         return True

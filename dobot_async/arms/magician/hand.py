@@ -19,12 +19,12 @@ from dobot_async.arms.magician.queue import MagicianQueue
 from dobot_async.arms.magician.stopping import STILL
 from dobot_async.errors import CommandRejected, DobotError
 
-__all__ = ["Led"]
+__all__ = ["HandGuided"]
 
 TEACH_INTERVAL = 0.05
 
 
-class Led:
+class HandGuided:
     """The part of a Magician that jogs, and that is guided by hand."""
 
     link: Link[Any]

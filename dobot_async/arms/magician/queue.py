@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeVar
 from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.batch import BatchBuilder, batch
 from dobot_async._core.queue.epoch import Epoch
-from dobot_async._core.queue.motion import WITHDRAWN, Motion, Outbox
+from dobot_async._core.queue.motion import WITHDRAWN, Motion, MotionOutbox
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_choice
 from dobot_async._core.util.tasks import STAYING
@@ -22,7 +22,7 @@ from dobot_async.arms.magician.kinematics import Kinematics
 from dobot_async.arms.magician.verbs import Verbs
 from dobot_async.errors import DobotError, MotionUnknown
 
-__all__ = ["Batch", "MagicianQueue", "Program"]
+__all__ = ["Batch", "Download", "MagicianQueue"]
 
 Q = TypeVar("Q")
 
@@ -172,7 +172,7 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
         return batch(self, Batch(self), timeout)
 
     @asynccontextmanager
-    async def download(self, *, loops: int = 1) -> AsyncGenerator[Program]:
+    async def download(self, *, loops: int = 1) -> AsyncGenerator[Download]:
         """Store the commands of the block in the arm, which runs them when its key is pressed. Manual 2.19.4.
 
         A cancellation or a stop ends it, and the arm executes again what it is told. After power-up the arm knows of no
@@ -185,13 +185,13 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
             ValueError: A rail or a pin that a command needs was declared neither to the arm nor in the program.
             MotionStopped: The arm was stopped meanwhile; a part of the program may be stored.
         """
-        program, epoch = Program(self), self.epoch
+        program, epoch = Download(self), self.epoch
         yield program
         await self.declared.check([motion.entry.value for motion in program.motions], queued=True)
         if self._arm.keeper:
             await self._arm.keeper.admit_stored(program.motions, self.kinematics)
 
-        outbox = Outbox(lambda _: None)
+        outbox = MotionOutbox(lambda _: None)
         outbox.add(program.motions)
         async with self._arm.cleanup.at_end(self._arm.end_download, "the end of the download"):
             await self.exclusively(self._arm.download(outbox, loops), "the download", epoch)
@@ -214,7 +214,7 @@ class Batch(BatchBuilder, Verbs[Motion]):
         return self.perform(*plan(self._before(*self.motions)), timeout)
 
 
-class Program(BatchBuilder, Verbs[Motion]):
+class Download(BatchBuilder, Verbs[Motion]):
     """Commands to be stored in the arm; nobody awaits their Motions."""
 
     def __init__(self, queue: MagicianQueue) -> None:

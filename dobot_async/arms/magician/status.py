@@ -32,7 +32,7 @@ WRAP = 1 << 32  # ms, after which the arm's clock begins again: 49.7 days
 DRIFT = 0.05  # of the time that has passed, by which the arm's clock may differ from ours
 
 
-class Reading(NamedTuple):
+class StatusReading(NamedTuple):
     """What the arm's clock said, in ms, and when it was asked and answered, in seconds of ours."""
 
     clock: int
@@ -59,7 +59,7 @@ class ArmStatus:
         self._on_restart = restarted
         self._now = asyncio.get_running_loop().time
         self._restart_known = True
-        self._reading: Reading | None = None
+        self._reading: StatusReading | None = None
         self._clockless = False
         self._outages = 0
 
@@ -162,14 +162,14 @@ class ArmStatus:
         self._on_restart()
         return MotionUnknown("the arm was switched off and on: it counts its commands anew, and its queue is empty")
 
-    async def _read_clock(self, timeout: float | None) -> Reading:
+    async def _read_clock(self, timeout: float | None) -> StatusReading:
         asked_at = self._now()
         clock = await self._link.request(c.GET_DEVICE_TIME, None, timeout=timeout)
-        self._reading = Reading(clock, asked_at, self._now())
+        self._reading = StatusReading(clock, asked_at, self._now())
         return self._reading
 
 
-def is_same_run(before: Reading, after: Reading) -> bool:
+def is_same_run(before: StatusReading, after: StatusReading) -> bool:
     """Return whether the arm's clock has counted, modulo its size, what has passed between two readings."""
     least = int(1000 * (1 - DRIFT) * (after.asked_at - before.answered_at))  # it counts whole ms
     most = math.ceil(1000 * (1 + DRIFT) * (after.answered_at - before.asked_at))

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from dobot_async._core.link.correlator import Request
 from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.wire import Command, Number, u64
-from dobot_async._core.queue.executor import Entry, Source, alarmed
+from dobot_async._core.queue.executor import Entry, MotionSource, alarmed
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.hooks import Hooks
 from dobot_async.arms.magician import commands as c
@@ -78,7 +78,7 @@ class Submission:
         self._check(value)
         return Entry(command, value, frame)
 
-    async def submit(self, source: Source) -> None:
+    async def submit(self, source: MotionSource) -> None:
         """Queue commands in order; see `Executor`."""
         while source or self.ledger.unacked:
             await self._reconcile(source)
@@ -104,7 +104,7 @@ class Submission:
             elif self.ledger.last is None:
                 await self._open()
 
-    async def _submit_one(self, source: Source) -> None:
+    async def _submit_one(self, source: MotionSource) -> None:
         """Send one command, and find out whether the arm took it."""
         if self._datagrams:
             await self._datagrams.before_command()
@@ -122,7 +122,7 @@ class Submission:
         else:
             await self._reconcile(source)
 
-    async def _submit_window(self, source: Source) -> None:
+    async def _submit_window(self, source: MotionSource) -> None:
         """Send commands, at most `window` of them unacknowledged, with something to read behind each window's length.
 
         An acknowledgement does not say whose it is: with one command lost, the next one's would pass for it. But this
@@ -158,7 +158,7 @@ class Submission:
         """What the answer to a checkpoint says: the highest index acknowledged before it, and the left space."""
         return self._heard, c.GET_QUEUED_CMD_LEFT_SPACE.reply.decode(frame.params)
 
-    def _confirm(self, request: Request[Frame], count: int, source: Source, sent_since: int) -> bool:
+    def _confirm(self, request: Request[Frame], count: int, source: MotionSource, sent_since: int) -> bool:
         """Enter the commands before a checkpoint; return False if the arm did not take them all."""
         if request.value is None or self.ledger.last is None:
             return False
@@ -228,7 +228,7 @@ class Submission:
             index: int | None = request.value if await self._settle(request) else None
             return index
 
-    async def _reconcile(self, source: Source) -> None:
+    async def _reconcile(self, source: MotionSource) -> None:
         """Find out what became of the unacknowledged commands: those that the arm did not take are sent again."""
         ledger = self.ledger
         for _ in range(PROBES if ledger.unacked else 0):
@@ -264,7 +264,7 @@ class Submission:
         if ledger.unacked:
             raise MotionUnknown(f"the arm answers, but does not say whether it took {self._names()}")
 
-    def _enter(self, resolution: Resolution, source: Source) -> None:
+    def _enter(self, resolution: Resolution, source: MotionSource) -> None:
         """Tell the source what the arm took; for the others there may have been no room."""
         if resolution.lost:
             self.space.room = 0

@@ -15,7 +15,7 @@ from typing import Any
 from dobot_async._core.protocol.contract import Parser
 from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.protocol.wire import Command
-from dobot_async.arms.bridge_adapter import ByKey, Kind, Reading
+from dobot_async.arms.bridge_adapter import ByKey, RequestKind, TelemetryRead
 from dobot_async.arms.mycobot import commands as c
 from dobot_async.arms.mycobot import frame as f
 from dobot_async.arms.mycobot.alarms import joint_alarms
@@ -84,7 +84,7 @@ BARRIERS = (c.IS_POWER_ON, c.IS_CONTROLLER_CONNECTED, c.IS_FREE_MODE, c.GET_SPEE
 
 
 class BridgedCobot(ByKey[Frame]):
-    """See `dobot_async.arms.bridge_adapter.Bridged`; one for each model."""
+    """See `dobot_async.arms.bridge_adapter.BridgeAdapter`; one for each model."""
 
     filler = b""
     header = f.HEADER
@@ -98,10 +98,10 @@ class BridgedCobot(ByKey[Frame]):
         self.stopping = (request(model, c.STOP),)
         self.denials = {"calibration": frozenset(model.rows[row].id for row in CALIBRATION if row in model.rows)}
         self.readings = {
-            "pose": Reading(request(model, c.GET_COORDS), 0.2, self._told_coords),
-            "joints": Reading(request(model, c.GET_ANGLES), 0.2, self._told_angles),
-            "motion": Reading(request(model, c.IS_MOVING), 0.2, self._told_motion),
-            "alarms": Reading(request(model, c.READ_NEXT_ERROR), 1.0, self._told_alarms),
+            "pose": TelemetryRead(request(model, c.GET_COORDS), 0.2, self._told_coords),
+            "joints": TelemetryRead(request(model, c.GET_ANGLES), 0.2, self._told_angles),
+            "motion": TelemetryRead(request(model, c.IS_MOVING), 0.2, self._told_motion),
+            "alarms": TelemetryRead(request(model, c.READ_NEXT_ERROR), 1.0, self._told_alarms),
         }
         self._model = model
 
@@ -117,13 +117,13 @@ class BridgedCobot(ByKey[Frame]):
         """Returns what follows one program."""
         return CobotWatch(self._model, asyncio.get_running_loop().time)
 
-    def kind(self, request: Frame) -> Kind:
+    def kind(self, request: Frame) -> RequestKind:
         """Returns what a request is."""
         row = self._row(request)
         if row in STOPS:
-            return Kind.STOP
+            return RequestKind.STOP
 
-        return Kind.WRITE if row is None or row.write else Kind.READ
+        return RequestKind.WRITE if row is None or row.write else RequestKind.READ
 
     def name(self, request: Frame) -> str:
         """Returns the name of the row."""
@@ -144,11 +144,11 @@ class BridgedCobot(ByKey[Frame]):
         No command need be answered. One more stop, said for the lack of an answer, would end what its program has gone
         on to since.
         """
-        return self.kind(request) is Kind.READ
+        return self.kind(request) is RequestKind.READ
 
     def may_be_silent(self, request: Frame) -> bool:
         """Returns whether the arm may have taken a request without an answer: each command."""
-        return self.kind(request) is not Kind.READ
+        return self.kind(request) is not RequestKind.READ
 
     def accept(self, request: Frame, reply: Frame) -> Frame:
         """Returns the reply; raises ProtocolError if it cannot be one to this request, or is the request, sent back."""

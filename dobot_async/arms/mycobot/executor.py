@@ -26,7 +26,7 @@ from dobot_async.arms.mycobot.channel import SILENCE, Channel
 from dobot_async.arms.mycobot.goals import GOALS, Goals
 from dobot_async.arms.mycobot.gripper import GRIPPER, run_gripper
 from dobot_async.arms.mycobot.keeping import CobotKeeper
-from dobot_async.arms.mycobot.standstill import LOOKS, Goal, Verdict, Watch, cannot_read_servos
+from dobot_async.arms.mycobot.standstill import LOOKS, Goal, StandstillDetector, Verdict, cannot_read_servos
 from dobot_async.arms.mycobot.stopping import stop_until_still
 from dobot_async.arms.mycobot.targets import MOVE_PARTLY, SUCTION, WAIT
 from dobot_async.errors import ArmAlarm, CommandRejected, MotionStopped, ReplyTimeout
@@ -68,7 +68,7 @@ class CobotRunner:
         self._goals = Goals(channel, *tolerance)
         self._loop = asyncio.get_running_loop()
         self._paused = False
-        self._watching: Watch | None = None
+        self._watching: StandstillDetector | None = None
         self._lost = 0
         self._reached: Reached | None = None
 
@@ -213,7 +213,7 @@ class CobotRunner:
     async def _watch(self, goal: Goal, entry: Entry, before: int | None) -> None:
         """Return when the arm stands where a motion leads, and raise when it never will."""
         now = self._loop.time
-        watch = self._watching = Watch(goal, now())
+        watch = self._watching = StandstillDetector(goal, now())
         checked, self._lost = now(), 0
         while True:
             moving = await self._channel.poll(c.IS_MOVING, None)

@@ -16,7 +16,7 @@ from dobot_async.arms.mycobot.executor import CobotRunner, Tolerance
 from dobot_async.arms.mycobot.pose import AXES
 from dobot_async.arms.mycobot.queue import CobotQueue
 from dobot_async.errors import CommandRejected
-from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, Look, Point, follow_target
+from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, FollowStatus, TargetPoint, follow_target
 
 __all__ = ["CobotFollowing"]
 
@@ -93,7 +93,7 @@ class Led:
         self._told = False
         runner.prepare(c.SEND_ANGLES, c.JointsMove((0.0,) * self.joints, speed))  # refuses a wrong speed
 
-    def allow(self, point: Point) -> None:
+    def allow(self, point: TargetPoint) -> None:
         """Raise ValueError for a place that is beyond the model's limits."""
         model = self._channel.model
         check = model.check_joint if point.joints else model.check_coord
@@ -110,16 +110,16 @@ class Led:
         self._told = True
         await self._fresh(on=True)
 
-    async def look(self, *, joints: bool) -> Look:
+    async def look(self, *, joints: bool) -> FollowStatus:
         """Read the coordinates, or the joints."""
         found = await self._channel.poll(c.GET_ANGLES if joints else c.GET_COORDS, None)
-        return Look(Point(tuple(found), joints))
+        return FollowStatus(TargetPoint(tuple(found), joints))
 
-    def within(self, look: Look, point: Point) -> Point:  # noqa: ARG002 - such a motion can be replaced at any time
+    def within(self, look: FollowStatus, point: TargetPoint) -> TargetPoint:  # noqa: ARG002 - such a motion can be replaced at any time
         """Return the place: a stop ends the way to it at once."""
         return point
 
-    async def go(self, point: Point) -> bool:
+    async def go(self, point: TargetPoint) -> bool:
         """Send the arm there. That it was not acknowledged says nothing: older firmware acknowledges none."""
         if point.joints:
             entry = self._runner.prepare(c.SEND_ANGLES, c.JointsMove(point.numbers, self._speed))

@@ -36,7 +36,7 @@ WHOLE_WAY = 10.0  # seconds for it at full speed, with much to spare
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class GripperReading:
     """What the arm tells of its gripper at one time; None for what its firmware does not know."""
 
     moving: bool | None
@@ -80,7 +80,7 @@ class Grip:
         if not (heard and closes):
             raise CommandRejected(f"the gripper does not move{at(before.value)}; is it plugged in, and free?")
 
-    async def _rests(self, before: Look) -> bool:
+    async def _rests(self, before: GripperReading) -> bool:
         """Return whether the gripper has moved, or is where it was to go, once it rests."""
         begun = self._now()
         still, last, seen = 0, before, False
@@ -99,7 +99,7 @@ class Grip:
 
             await asyncio.sleep(POLL)
 
-    def _judge(self, look: Look, *, moved: bool) -> bool:
+    def _judge(self, look: GripperReading, *, moved: bool) -> bool:
         """Whether a gripper that rests has done it; raises MotionStopped if it did not open as far as it was to."""
         if self._is_there(look):
             return True
@@ -109,25 +109,25 @@ class Grip:
 
         return moved
 
-    def _moved(self, before: Look, look: Look, *, seen: bool) -> bool:
+    def _moved(self, before: GripperReading, look: GripperReading, *, seen: bool) -> bool:
         """Whether the gripper was seen to move."""
         if before.value is None or look.value is None:
             return seen
 
         return abs(look.value - before.value) > MOVED
 
-    def _is_there(self, look: Look) -> bool:
+    def _is_there(self, look: GripperReading) -> bool:
         """Whether it is where it was to go."""
         return look.value is not None and abs(look.value - self._goal) <= NEAR
 
-    async def _look(self) -> Look:
+    async def _look(self) -> GripperReading:
         """Ask how the gripper is; raise CommandRejected if there is none."""
         moving = await self._channel.poll_if_known(c.IS_GRIPPER_MOVING, None)
         value = await self._value()
         if value == ABSENT:  # once more, for a frame has no checksum
             value = await self._value()
 
-        return Look(moving, None if value is None else check_gripper(value))
+        return GripperReading(moving, None if value is None else check_gripper(value))
 
     async def _value(self) -> int | None:
         """Ask how far it is open; None if the firmware does not tell."""

@@ -21,7 +21,7 @@ from typing import Any
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.mycobot.models import SENTINEL
 
-__all__ = ["STILL", "Goal", "Verdict", "Watch", "cannot_read_servos", "turned"]
+__all__ = ["STILL", "Goal", "StandstillDetector", "Verdict", "cannot_read_servos", "turned"]
 
 LOOKS = 3  # in a row, all of them still, of an arm that was not seen to move
 MOVED, FAST = 2, 1  # the same for one that has moved, and for one that was so fast that it cannot be creeping
@@ -89,7 +89,7 @@ class Goal:
 
 
 @dataclass(slots=True)
-class Watch:
+class StandstillDetector:
     """One motion, from the moment it was sent.
 
     Attributes:

@@ -8,7 +8,7 @@ from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.answers import Receipt
 from dobot_async.arms.ultraarm.channel import Channel
-from dobot_async.arms.ultraarm.status import StatusPoller
+from dobot_async.arms.ultraarm.status import UltraArmPoller
 from dobot_async.errors import MotionUnknown
 
 __all__ = ["TRIES", "Acknowledged"]
@@ -24,7 +24,7 @@ class Acknowledged:
         status: What it shows.
     """
 
-    def __init__(self, channel: Channel, status: StatusPoller) -> None:
+    def __init__(self, channel: Channel, status: UltraArmPoller) -> None:
         self._channel = channel
         self._status = status
         self._says_ok: bool | None = None

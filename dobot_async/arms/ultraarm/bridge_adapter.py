@@ -22,10 +22,19 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.contract import Parser
 from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.protocol.wire import Command
-from dobot_async.arms.bridge_adapter import Kind, Reading, Switch
+from dobot_async.arms.bridge_adapter import RequestKind, Switch, TelemetryRead
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.answers import STATUS as STATUS_LAYOUT
-from dobot_async.arms.ultraarm.bridge_lines import PATTERNS, PREFIX, Answers, Line, Requests, fits, understood, words_of
+from dobot_async.arms.ultraarm.bridge_lines import (
+    PATTERNS,
+    PREFIX,
+    Answers,
+    BridgedLine,
+    Requests,
+    fits,
+    understood,
+    words_of,
+)
 from dobot_async.arms.ultraarm.frame import BARRIERS, END, encode
 from dobot_async.arms.ultraarm.opening import opened
 from dobot_async.errors import ProtocolError
@@ -55,7 +64,7 @@ class UltraArmWatch:
         self._switches = {c.LASER_ON.name: Switch(), c.SET_PWM.name: Switch()}
         self._begins_by = -math.inf
 
-    def sent(self, request: Line) -> None:
+    def sent(self, request: BridgedLine) -> None:
         """A request that is no read goes out."""
         row, value = understood(request)
         switch = SWITCHED.get(row) if row else None
@@ -69,14 +78,14 @@ class UltraArmWatch:
             self._told = True
             self._begins_by = self._clock() + BEGINS
 
-    def answered(self, request: Line, reply: Line) -> None:  # noqa: ARG002 - whatever it was
+    def answered(self, request: BridgedLine, reply: BridgedLine) -> None:  # noqa: ARG002 - whatever it was
         """It was answered, which does not say that it is done; but an "off" is in the queue."""
         row, value = understood(request)
         switch = SWITCHED.get(row) if row else None
         if switch and not switch.on(value):
             self._switches[switch.name].switch_off(queued=True)
 
-    def moving(self, reply: Line | None) -> bool:
+    def moving(self, reply: BridgedLine | None) -> bool:
         """Return whether the arm is, or may be, in the middle of what it was told; `reply` is that to the question."""
         if any(switch.is_on(finished=True) for switch in self._switches.values()):
             return True
@@ -90,7 +99,7 @@ class UltraArmWatch:
         status = STATUS_LAYOUT.decode(reply.params)
         return status.queue_size > 0 or not status.at_rest
 
-    def off(self) -> Sequence[Line]:
+    def off(self) -> Sequence[BridgedLine]:
         """Return nothing but what `stopping` has."""
         return ()
 
@@ -116,11 +125,11 @@ SWITCHED: Mapping[Command[Any, Any], Switched] = {
 
 
 class BridgedUltraArm:
-    """See `dobot_async.arms.bridge_adapter.Bridged`."""
+    """See `dobot_async.arms.bridge_adapter.BridgeAdapter`."""
 
     model = "ultraarm"
     filler = b""  # it would let the arm do half a line; without it, that and the next one are an error
-    barriers = tuple(Line(bytes(frame)) for frame in BARRIERS)
+    barriers = tuple(BridgedLine(bytes(frame)) for frame in BARRIERS)
     proves_stop = False
     in_order = True
 
@@ -130,25 +139,25 @@ class BridgedUltraArm:
         self.insisting = (question(c.RELEASE), *self.stopping)
         self.denials = {"calibration": frozenset(row.name for row in CALIBRATION)}
         self.readings = {
-            "pose": Reading(question(c.GET_COORDS), 0.2, lambda reply: told(c.GET_COORDS, reply)),
-            "joints": Reading(question(c.GET_ANGLES), 0.2, lambda reply: told(c.GET_ANGLES, reply)),
-            "motion": Reading(question(c.GET_STATUS), 0.2, lambda reply: told(c.GET_STATUS, reply)),
+            "pose": TelemetryRead(question(c.GET_COORDS), 0.2, lambda reply: told(c.GET_COORDS, reply)),
+            "joints": TelemetryRead(question(c.GET_ANGLES), 0.2, lambda reply: told(c.GET_ANGLES, reply)),
+            "motion": TelemetryRead(question(c.GET_STATUS), 0.2, lambda reply: told(c.GET_STATUS, reply)),
         }
 
     async def open(self, url: str, timeout: float) -> Transport:
         """Open the way to the arm; raise ValueError for one that does not keep the order."""
         return await opened(url, timeout)
 
-    def encode(self, command: Command[Any, Any], params: bytes, *, queued: bool) -> Line:
+    def encode(self, command: Command[Any, Any], params: bytes, *, queued: bool) -> BridgedLine:
         """Make the request of a row."""
         frame = encode(command, params, queued=queued)
-        return Line(bytes(frame))
+        return BridgedLine(bytes(frame))
 
     def parser(self) -> Answers:
         """Return a parser for the arm's stream."""
         return Answers()
 
-    def requests(self) -> Parser[Line]:
+    def requests(self) -> Parser[BridgedLine]:
         """Return a parser for a client's stream."""
         return Requests()
 
@@ -159,7 +168,7 @@ class BridgedUltraArm:
 
         return None if PART_OF_A_WORD.fullmatch(data) else False
 
-    def attach(self, link: Link[Line], parser: Parser[Line]) -> None:
+    def attach(self, link: Link[BridgedLine], parser: Parser[BridgedLine]) -> None:
         """Let the parser know what is asked."""
         if isinstance(parser, Answers):
             link.on_frame.add(parser.follow)
@@ -168,24 +177,24 @@ class BridgedUltraArm:
         """Return what follows one program."""
         return UltraArmWatch(asyncio.get_running_loop().time)
 
-    def kind(self, request: Line) -> Kind:
+    def kind(self, request: BridgedLine) -> RequestKind:
         """Return what a request is; a line that is not wholly understood is a write."""
         row, _ = understood(request)
         if row in STOPS:
-            return Kind.STOP
+            return RequestKind.STOP
 
-        return Kind.WRITE if row is None or row.write else Kind.READ
+        return RequestKind.WRITE if row is None or row.write else RequestKind.READ
 
-    def subject(self, request: Line) -> Hashable:
+    def subject(self, request: BridgedLine) -> Hashable:
         """Return the line's command."""
         return self.name(request)
 
-    def name(self, request: Line) -> str:
+    def name(self, request: BridgedLine) -> str:
         """Return the line's command, the first if there are several."""
         words = words_of(request)
         return next((name for letter, name in words if letter in "GM"), words[0][1] if words else "?")
 
-    def patience(self, request: Line) -> float:
+    def patience(self, request: BridgedLine) -> float:
         """Return the seconds that an answer may take."""
         row, _ = understood(request)
         if row is None:
@@ -193,15 +202,15 @@ class BridgedUltraArm:
 
         return row.timeout if row.write else SILENCE
 
-    def repeatable(self, request: Line) -> bool:
+    def repeatable(self, request: BridgedLine) -> bool:
         """Return whether it may be sent again: what reads, and what stops."""
-        return self.kind(request) is not Kind.WRITE
+        return self.kind(request) is not RequestKind.WRITE
 
-    def may_be_silent(self, request: Line) -> bool:  # noqa: ARG002 - what closes each answer is asked with it
+    def may_be_silent(self, request: BridgedLine) -> bool:  # noqa: ARG002 - what closes each answer is asked with it
         """Return False."""
         return False
 
-    def accept(self, request: Line, reply: Line) -> Line:
+    def accept(self, request: BridgedLine, reply: BridgedLine) -> BridgedLine:
         """Return what the client is told; raise ProtocolError if it is not the answer to this request."""
         if not fits(request, reply.text):
             raise ProtocolError(f"{reply.text!r} is no answer to {self.name(request)}")
@@ -213,9 +222,9 @@ class BridgedUltraArm:
                 text = PREFIX.sub(b"", text[: last.start()]) + text[last.end() :].lstrip()
 
         text = text.strip()
-        return Line(text + b"\r\n" if text else b"")
+        return BridgedLine(text + b"\r\n" if text else b"")
 
-    def aside(self, frame: Line) -> bool:
+    def aside(self, frame: BridgedLine) -> bool:
         """Return whether the arm has said something that answers nothing."""
         return frame.aside
 
@@ -223,7 +232,7 @@ class BridgedUltraArm:
         """Return what a client is told whose request is not passed on."""
         return f"ERROR: {' '.join(reason.split())}\r\n".encode("ascii", "replace")
 
-    def check(self, request: Line) -> None:
+    def check(self, request: BridgedLine) -> None:
         """Raise ProtocolError for what is no line, or not just one command with a whole number.
 
         Whoever reads a line in another way than the arm does cannot say what is denied.
@@ -233,12 +242,12 @@ class BridgedUltraArm:
             raise ProtocolError("COMMAND NOT RECOGNIZED: expected one command, letters with numbers")
 
 
-def question(command: Command[Any, Any], value: Any = None) -> Line:
+def question(command: Command[Any, Any], value: Any = None) -> BridgedLine:
     """A request of the bridge's own; its answer is not cut."""
-    return Line(bytes(encode(command, command.request.encode(value), queued=False)))
+    return BridgedLine(bytes(encode(command, command.request.encode(value), queued=False)))
 
 
-def told(command: Command[None, Any], reply: Line) -> dict[str, Any]:
+def told(command: Command[None, Any], reply: BridgedLine) -> dict[str, Any]:
     """What a reading says."""
     return asdict(command.reply.decode(reply.params))
 

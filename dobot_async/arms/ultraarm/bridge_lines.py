@@ -30,7 +30,7 @@ from dobot_async.arms.ultraarm.frame import (
 )
 from dobot_async.errors import ProtocolError
 
-__all__ = ["PATTERNS", "PREFIX", "Answers", "Line", "Requests", "fits", "understood", "words_of"]
+__all__ = ["PATTERNS", "PREFIX", "Answers", "BridgedLine", "Requests", "fits", "understood", "words_of"]
 
 LONGEST_LINE = 256
 TOKEN = b"TOKEN "
@@ -47,7 +47,7 @@ PREFIX = re.compile(rb"DATA\s*:\s*\Z", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class BridgedLine:
     """A line, or several that belong together.
 
     Attributes:
@@ -88,7 +88,7 @@ class Requests:
         self._first = b""  # the bytes of the first line, until it is known to be a token or none
         self._greeted = False
 
-    def feed(self, data: bytes) -> list[Line]:
+    def feed(self, data: bytes) -> list[BridgedLine]:
         """Take the next bytes, return the requests that they complete."""
         data = data if self._greeted else self._without_token(data)
         *lines, rest = (self._buffer + printable(data).replace(b"\n", b"")).split(END)
@@ -96,7 +96,7 @@ class Requests:
         self.junk_bytes += len(rest) - len(self._buffer)
         return list(together([line + END for line in lines if line.strip()]))
 
-    def resync(self) -> list[Line]:
+    def resync(self) -> list[BridgedLine]:
         """Half a line may yet become a whole one: somebody may be typing it."""
         return []
 
@@ -131,19 +131,19 @@ class Answers:
     def __init__(self) -> None:
         self.junk_bytes = self.bad_frames = 0
         self._buffer = b""
-        self._asked: deque[Line] = deque(maxlen=ASKED)
+        self._asked: deque[BridgedLine] = deque(maxlen=ASKED)
 
-    def follow(self, outgoing: bool, frame: Line) -> None:
+    def follow(self, outgoing: bool, frame: BridgedLine) -> None:
         """Take note of what goes out to the arm."""
         if outgoing:
             self._asked.append(frame)
 
-    def feed(self, data: bytes) -> list[Line]:
+    def feed(self, data: bytes) -> list[BridgedLine]:
         """Take the next bytes, return the answers that they complete and the lines that answer nothing."""
         text = printable(data)
         self.junk_bytes += len(data) - len(text)
         text = self._buffer + text
-        found: list[Line] = []
+        found: list[BridgedLine] = []
         while closing := CLOSING.search(text):
             found += self._answers(text[: closing.end()].strip())
             text = text[closing.end() :].lstrip()
@@ -158,7 +158,7 @@ class Answers:
         self.junk_bytes += len(text) - len(self._buffer)
         return found
 
-    def resync(self) -> list[Line]:
+    def resync(self) -> list[BridgedLine]:
         """Half an answer hides nothing."""
         return []
 
@@ -168,21 +168,21 @@ class Answers:
         self._buffer = b""
         self._asked.clear()
 
-    def _answers(self, text: bytes) -> list[Line]:
+    def _answers(self, text: bytes) -> list[BridgedLine]:
         """A whole answer, and what stands in it that is none to a reading: it came unasked meanwhile."""
         while self._asked:
             asked = self._asked.popleft()
             if fits(asked, text):
                 if named_alone(asked) and not errors(text):
                     text, asides = sorted_out(text)
-                    return [*asides, Line(text)]
+                    return [*asides, BridgedLine(text)]
 
                 break
 
-        return [Line(text + b"\r\n")]
+        return [BridgedLine(text + b"\r\n")]
 
 
-def words_of(request: Line) -> list[tuple[str, str]]:
+def words_of(request: BridgedLine) -> list[tuple[str, str]]:
     """The words of a request's first line, each as its letter and as a whole: [("G", "G0"), ("X", "X200")].
 
     The number of a command is written in one way, for an arm may take M31.0, M+31 and M031 for M31 as well.
@@ -203,7 +203,7 @@ def plain(number: str) -> str:
     return number
 
 
-def understood(request: Line) -> tuple[Command[Any, Any] | None, Any]:
+def understood(request: BridgedLine) -> tuple[Command[Any, Any] | None, Any]:
     """The row of a request and its parameters; None for what is not wholly understood."""
     words = words_of(request)
     row = c.BY_WORD.get(words[0][1]) if words else None
@@ -216,7 +216,7 @@ def understood(request: Line) -> tuple[Command[Any, Any] | None, Any]:
         return None, None
 
 
-def together(lines: list[bytes]) -> Iterator[Line]:
+def together(lines: list[bytes]) -> Iterator[BridgedLine]:
     """Make requests of lines: a reading and what closes its answer are one, anything else is one each."""
     bare = [line.upper().strip() for line in lines]
     at = 0
@@ -225,13 +225,13 @@ def together(lines: list[bytes]) -> Iterator[Line]:
         while end < len(lines) and bare[end] in {SIZE, SWITCHES}:
             end += 1
 
-        row, _ = understood(Line(lines[at]))
+        row, _ = understood(BridgedLine(lines[at]))
         closed = end < len(lines) and bare[end] == COORDS and bare[at] != COORDS
         if row and not row.write and closed:
-            yield Line(b"".join(lines[at : end + 1]))
+            yield BridgedLine(b"".join(lines[at : end + 1]))
             at = end + 1
         else:
-            yield Line(lines[at], closing(bare[at], row))
+            yield BridgedLine(lines[at], closing(bare[at], row))
             at += 1
 
 
@@ -248,16 +248,16 @@ def closing(line: bytes, row: Command[Any, Any] | None) -> bytes:
 
 def asked(lines: bytes) -> Iterator[bytes]:
     """Yield the commands of a request, as far as they are understood."""
-    rows = (understood(Line(line))[0] for line in lines.split(END) if line)
+    rows = (understood(BridgedLine(line))[0] for line in lines.split(END) if line)
     yield from (row.name.encode() for row in rows if row)
 
 
-def named(request: Line) -> set[bytes]:
+def named(request: BridgedLine) -> set[bytes]:
     """The readings that a request asks for, what closes its answer included."""
     return {word for word in asked(bytes(request)) if word in PATTERNS}
 
 
-def fits(request: Line, answer: bytes) -> bool:
+def fits(request: BridgedLine, answer: bytes) -> bool:
     """Whether an answer is one to a request: the readings in it are those that were asked, or errors in their place."""
     asked = named(request)
     found = {word for word, pattern in PATTERNS.items() if pattern.search(answer)}
@@ -265,18 +265,18 @@ def fits(request: Line, answer: bytes) -> bool:
         return found == asked
 
     row, _ = understood(request)
-    must = {SIZE, SWITCHES, COORDS} if row is c.GET_STATUS else {COORDS} | named(Line(request.closing))
+    must = {SIZE, SWITCHES, COORDS} if row is c.GET_STATUS else {COORDS} | named(BridgedLine(request.closing))
     return must <= found <= asked
 
 
-def named_alone(request: Line) -> bool:
+def named_alone(request: BridgedLine) -> bool:
     """Whether a request is a reading, whose answer is known by its name."""
     row, _ = understood(request)
     return row is not None and not row.write and row is not c.GET_STATUS
 
 
-def sorted_out(text: bytes) -> tuple[bytes, list[Line]]:
+def sorted_out(text: bytes) -> tuple[bytes, list[BridgedLine]]:
     """The lines of a text: those of readings, and the others, which answer none."""
     lines = [line for line in text.replace(b"\n", END).split(END) if line.strip()]
-    asides = [Line(line.strip() + b"\r\n", aside=True) for line in lines if not NAMED.search(line)]
+    asides = [BridgedLine(line.strip() + b"\r\n", aside=True) for line in lines if not NAMED.search(line)]
     return b"".join(line + b"\r\n" for line in lines if NAMED.search(line)), asides

@@ -20,7 +20,7 @@ from dobot_async.arms.ultraarm.queue import UltraArmQueue
 from dobot_async.arms.ultraarm.runner import UltraArmRunner
 from dobot_async.arms.ultraarm.status import STATUS_AND_ANGLES
 from dobot_async.errors import CommandRejected, MotionUnknown
-from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, Look, Point, follow_target
+from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, FollowStatus, TargetPoint, follow_target
 from dobot_async.following.points import apart, part_of_way
 
 __all__ = ["UltraArmFollowing"]
@@ -104,10 +104,10 @@ class Led:
         self._told = False
         self._speeds = {False: min(max(mm, SLOWEST), FASTEST), True: min(max(degrees, SLOWEST), FASTEST)}
         self._length = FIRST
-        self._here: Point | None = None
-        self._sent: tuple[float, Point] | None = None
+        self._here: TargetPoint | None = None
+        self._sent: tuple[float, TargetPoint] | None = None
 
-    def allow(self, point: Point) -> None:
+    def allow(self, point: TargetPoint) -> None:
         """Raise ValueError for a place that is beyond the limits."""
         self._runner.limits.check(command(point, None)[1])
 
@@ -123,7 +123,7 @@ class Led:
         if self._constant:
             await runner.ask(c.SET_SPEED_MODE, c.ModeOfSpeed(c.SpeedMode.CONSTANT))
 
-    async def look(self, *, joints: bool) -> Look:
+    async def look(self, *, joints: bool) -> FollowStatus:
         """Read whether the arm rests, and where; note how long the last motion has taken."""
         status = self._runner.status
         found = await status.poll_paced() if not joints else await status.poll(STATUS_AND_ANGLES)
@@ -131,7 +131,7 @@ class Led:
         if len(numbers) < 3:
             raise MotionUnknown(f"the arm does not tell where it is: {numbers}")
 
-        look = Look(Point((*numbers[:4], 0.0)[:4], joints), rests=found.at_rest and not found.queue_size)
+        look = FollowStatus(TargetPoint((*numbers[:4], 0.0)[:4], joints), rests=found.at_rest and not found.queue_size)
         self._here = look.here
         if look.rests and self._sent:
             (sent_at, start), self._sent = self._sent, None
@@ -141,11 +141,11 @@ class Led:
 
         return look
 
-    def within(self, look: Look, point: Point) -> Point:
+    def within(self, look: FollowStatus, point: TargetPoint) -> TargetPoint:
         """Return how far the arm comes within a moment."""
         return part_of_way(look.here, point, self._length, self._length)
 
-    async def go(self, point: Point) -> bool:
+    async def go(self, point: TargetPoint) -> bool:
         """Send the arm there; return False if that was lost."""
         assert self._here
         row, value = command(point, self._speeds[point.joints], self._here)
@@ -161,7 +161,7 @@ class Led:
             await self._runner.ask(c.SET_SPEED_MODE, c.ModeOfSpeed(c.SpeedMode.RAMPED))
 
 
-def command(point: Point, speed: float | None, here: Point | None = None) -> tuple[Command[Any, Any], Any]:
+def command(point: TargetPoint, speed: float | None, here: TargetPoint | None = None) -> tuple[Command[Any, Any], Any]:
     """The command that leads to a place; the fourth axis is left out where it stays, for it may not be there."""
     a, b, d, last = point.numbers
     fourth = None if here is None or abs(here.numbers[3] - last) <= GRAIN else last

@@ -67,7 +67,7 @@ def parse_gcode(
         ValueError: The file is not UTF-8 text.
         OSError: The file cannot be read.
     """
-    reader = Reader(limits, keeper)
+    reader = GCodeReader(limits, keeper)
     found: list[GCodeLine] = []
     wrong: list[tuple[int, str]] = []
     for number, written in enumerate(lines_of(source), 1):
@@ -94,7 +94,7 @@ def lines_of(source: Source) -> Iterable[str]:
     return source
 
 
-class Reader:
+class GCodeReader:
     """What the lines so far mean for the next one.
 
     Attributes:

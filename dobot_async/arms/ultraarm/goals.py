@@ -20,9 +20,9 @@ __all__ = [
     "AXES",
     "GRAIN",
     "INCREMENTS",
-    "Fault",
     "Goal",
     "HomeGoal",
+    "MotionFault",
     "PointGoal",
     "goal_of",
     "moved",
@@ -38,7 +38,7 @@ INCREMENTS = frozenset({c.MOVE_COORDS, c.MOVE_LINE})
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class MotionFault:
     """What keeps an ultraArm from a motion, or has ended it: what was seen, for it has no alarms of its own."""
 
     text: str
@@ -70,7 +70,7 @@ class Goal(Protocol):
         """
         ...
 
-    def missed(self, status: Status, *, set_out: bool) -> Fault:
+    def missed(self, status: Status, *, set_out: bool) -> MotionFault:
         """Return what to say of an arm that rests elsewhere."""
         ...
 
@@ -105,11 +105,11 @@ class PointGoal:
         was, miss = self.distance(before) if before else None, self.distance(here)
         return miss is not None and (miss <= GRAIN or (was is not None and miss < was and miss <= tolerance))
 
-    def missed(self, status: Status, *, set_out: bool) -> Fault:  # noqa: ARG002 - a place tells enough
+    def missed(self, status: Status, *, set_out: bool) -> MotionFault:  # noqa: ARG002 - a place tells enough
         """Return where it came to rest instead."""
         found = ", ".join(f"{name} {value:g}" for name, value in self._here(status).items())
         where = f"at {found}" if found else "somewhere that it does not tell"
-        return Fault(
+        return MotionFault(
             f"it came to rest {where} instead of {self}: out of reach, not homed, without power, or obstructed; "
             "tolerance= says how near is near enough"
         )
@@ -148,14 +148,14 @@ class HomeGoal:
         """Return False: nobody knows without having seen it move."""
         return False
 
-    def missed(self, status: Status, *, set_out: bool) -> Fault:
+    def missed(self, status: Status, *, set_out: bool) -> MotionFault:
         """Return whether it did not set out, or did not get there."""
         if not set_out:
-            return Fault("nothing moved on the way home (G28): the motors have no power? power_on(), then home()")
+            return MotionFault("nothing moved on the way home (G28): the motors have no power? power_on(), then home()")
 
         read = ", ".join(f"{each:g}" for each in status.endstops) or "nothing"
         wanted = ", ".join(map(str, self.switches or ()))
-        return Fault(
+        return MotionFault(
             f"it came to rest on the way home: its home switches read {read}, not {wanted}; home_switches= of connect "
             "says what they read at home"
         )

@@ -16,7 +16,7 @@ from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.tasks import Cleanup, cancel_and_join
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.answers import Receipt
-from dobot_async.arms.ultraarm.goals import Fault
+from dobot_async.arms.ultraarm.goals import MotionFault
 from dobot_async.arms.ultraarm.runner import UltraArmRunner
 from dobot_async.arms.ultraarm.status import PACE, RESTS, STATUS_AND_ANGLES
 from dobot_async.errors import CommandRejected, DobotError
@@ -25,8 +25,8 @@ __all__ = ["Jogger", "UltraArmJog", "direction_of"]
 
 SETS_OUT = 0.5  # seconds within which an arm sets out
 SELDOM = 0.05  # seconds between two looks at a jog
-BLOCKED = Fault("the jog did not set out: at the end of its way, not homed, or without power")
-RAN_OUT = Fault("the jog came to the end of its way before it was to end")
+BLOCKED = MotionFault("the jog did not set out: at the end of its way, not homed, or without power")
+RAN_OUT = MotionFault("the jog came to the end of its way before it was to end")
 
 
 class UltraArmJog(Enum):

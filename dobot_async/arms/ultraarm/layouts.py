@@ -60,7 +60,7 @@ class Letter:
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class TextField:
     """One annotated field of a request."""
 
     name: str
@@ -115,7 +115,7 @@ class Words(Generic[T]):
         return self.kind(**values)
 
 
-def build(field: Field, text: str) -> Any:
+def build(field: TextField, text: str) -> Any:
     """The value of a field."""
     try:
         return field.kind(field.letter.read(text))
@@ -123,12 +123,12 @@ def build(field: Field, text: str) -> Any:
         raise ProtocolError(str(error)) from None
 
 
-def field_of(name: str, annotation: Any) -> Field:
+def field_of(name: str, annotation: Any) -> TextField:
     """Read an annotation, such as `Annotated[float, Letter("X")] | None`."""
     choices = get_args(annotation) if get_origin(annotation) is Union else (annotation,)
     kinds = [each for each in choices if each is not type(None)]
     kind, letter = get_args(kinds[0])
-    return Field(name, letter, kind, optional=len(kinds) < len(choices))
+    return TextField(name, letter, kind, optional=len(kinds) < len(choices))
 
 
 class Whole(Words[T]):

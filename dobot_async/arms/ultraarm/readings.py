@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dobot_async.arms.info import DeviceInfo
 from dobot_async.arms.ultraarm import commands as c
-from dobot_async.arms.ultraarm.goals import Fault, pose_of
+from dobot_async.arms.ultraarm.goals import MotionFault, pose_of
 from dobot_async.arms.ultraarm.runner import UltraArmRunner
 from dobot_async.arms.ultraarm.status import STATUS_AND_ANGLES
 from dobot_async.errors import CommandRejected
@@ -64,7 +64,7 @@ class Readings:
 
         return DeviceInfo(serial_number="", name="", version=version)
 
-    async def get_alarms(self, *, timeout: float | None = None) -> tuple[Fault, ...]:
+    async def get_alarms(self, *, timeout: float | None = None) -> tuple[MotionFault, ...]:
         """Return what is known to keep the arm from moving: no power, or no place since it had none.
 
         The protocol has no alarms. This is what the program itself has done to the arm; what others did shows when a

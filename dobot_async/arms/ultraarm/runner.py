@@ -29,8 +29,8 @@ from dobot_async.arms.ultraarm.frame import Frame
 from dobot_async.arms.ultraarm.goals import INCREMENTS, goal_of, summed
 from dobot_async.arms.ultraarm.keeping import Stand, UltraArmKeeper
 from dobot_async.arms.ultraarm.state import ArmState
-from dobot_async.arms.ultraarm.status import RESTS, STATUS_AND_ANGLES, StatusPoller
-from dobot_async.arms.ultraarm.stopper import Stopper
+from dobot_async.arms.ultraarm.status import RESTS, STATUS_AND_ANGLES, UltraArmPoller
+from dobot_async.arms.ultraarm.stopper import UltraArmStopper
 from dobot_async.arms.ultraarm.tools import darken, wait_for_gripper
 from dobot_async.errors import CommandRejected, MotionUnknown
 
@@ -75,8 +75,8 @@ class UltraArmRunner:
         self.channel = Channel(link)
         self.keeper = UltraArmKeeper(workspace, self._stand) if workspace else None
         self.state = ArmState()
-        self.status = StatusPoller(self.channel.read, lambda: link.stats)
-        self.stopper = Stopper(self.status, self.state, on_stop)
+        self.status = UltraArmPoller(self.channel.read, lambda: link.stats)
+        self.stopper = UltraArmStopper(self.status, self.state, on_stop)
         self.busy = self.jogging = False
         self._commands = Acknowledged(self.channel, self.status)
         self._link = link

@@ -7,14 +7,14 @@ from typing import Any
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.ultraarm import commands as c
-from dobot_async.arms.ultraarm.goals import INCREMENTS, Fault
+from dobot_async.arms.ultraarm.goals import INCREMENTS, MotionFault
 from dobot_async.errors import CommandRejected
 
 __all__ = ["JOGS", "ArmState"]
 
 JOGS = frozenset({c.JOG_JOINT, c.JOG_COORD})
-NO_POWER = Fault("the motors have no power: power_on(), then home()")
-NO_PLACE = Fault("the arm lost its place when its motors had no power: home() first")
+NO_POWER = MotionFault("the motors have no power: power_on(), then home()")
+NO_PLACE = MotionFault("the arm lost its place when its motors had no power: home() first")
 
 
 @dataclass(slots=True)
@@ -46,7 +46,7 @@ class ArmState:
         elif command is c.LASER_ON or (command is c.SET_PWM and value.duty):
             self.laser = True
 
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[MotionFault, ...]:
         """Return what is known to keep the arm from moving."""
         return () if self.homed else (NO_PLACE,) if self.powered else (NO_POWER,)
 

@@ -19,11 +19,11 @@ from dobot_async._core.queue.executor import alarmed
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.answers import Status
 from dobot_async.arms.ultraarm.frame import errors
-from dobot_async.arms.ultraarm.goals import Fault, Goal, moved
+from dobot_async.arms.ultraarm.goals import Goal, MotionFault, moved
 from dobot_async.arms.ultraarm.layouts import Also
 from dobot_async.errors import ProtocolError, ReplyTimeout
 
-__all__ = ["PACE", "RESTS", "SILENCE", "STATUS_AND_ANGLES", "StatusPoller"]
+__all__ = ["PACE", "RESTS", "SILENCE", "STATUS_AND_ANGLES", "UltraArmPoller"]
 
 SILENCE = 5.0  # seconds without an answer after which what the arm does cannot be seen any more
 PACE = 0.02  # seconds between two polls of an arm that moves
@@ -34,7 +34,7 @@ SOON = 0.15  # seconds before the end of a motion from when on it is polled with
 STATUS_AND_ANGLES = replace(c.GET_STATUS, request=Also("M12"))
 
 
-class StatusPoller:
+class UltraArmPoller:
     """See the module.
 
     Args:
@@ -97,7 +97,7 @@ class StatusPoller:
 
         status = await self.poll(STATUS_AND_ANGLES if self._goal and self._goal.needs_angles else c.GET_STATUS)
         if status.text and errors(status.text.encode()):
-            raise alarmed([Fault(status.text)])
+            raise alarmed([MotionFault(status.text)])
 
         return status
 
@@ -137,7 +137,7 @@ class StatusPoller:
         self.set_out = self.set_out or not status.at_rest or (self._before is not None and moved(self._before, status))
         return status
 
-    async def arrive(self, goal: Goal, tolerance: float) -> Fault | None:
+    async def arrive(self, goal: Goal, tolerance: float) -> MotionFault | None:
         """Return when the arm rests at a goal, or elsewhere: then what is wrong."""
         while True:
             status = await self.poll_paced()

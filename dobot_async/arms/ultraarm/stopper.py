@@ -19,10 +19,10 @@ from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.answers import Status
 from dobot_async.arms.ultraarm.layouts import Also
 from dobot_async.arms.ultraarm.state import ArmState
-from dobot_async.arms.ultraarm.status import PACE, RESTS, StatusPoller
+from dobot_async.arms.ultraarm.status import PACE, RESTS, UltraArmPoller
 from dobot_async.errors import CommandRejected
 
-__all__ = ["Stopper"]
+__all__ = ["UltraArmStopper"]
 
 BRAKING = 5  # polls of an arm that was told to stop
 GIVING_UP = 50  # polls of an arm without power, after which it counts as one that cannot be stopped
@@ -31,7 +31,7 @@ STOP_AND_STATUS = replace(c.GET_STATUS, request=Also("M15"), write=True)
 RELEASE_AND_STATUS = replace(c.GET_STATUS, request=Also("M17"), write=True)
 
 
-class Stopper:
+class UltraArmStopper:
     """Stops the arm until it is seen to stand.
 
     Args:
@@ -40,7 +40,7 @@ class Stopper:
         on_stop: What to do where M15 does not end a motion.
     """
 
-    def __init__(self, status: StatusPoller, state: ArmState, on_stop: Literal["release", "finish"]) -> None:
+    def __init__(self, status: UltraArmPoller, state: ArmState, on_stop: Literal["release", "finish"]) -> None:
         self._status = status
         self._state = state
         self._on_stop = on_stop

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 import click
 
 from dobot_async.arms.registry import Parts
-from dobot_async.cli.family import Family
+from dobot_async.cli.family import FamilyCommands
 
 __all__ = ["FAMILIES", "chosen"]
 
-FAMILIES: Parts[Family] = Parts("cli")
+FAMILIES: Parts[FamilyCommands] = Parts("cli")
 """All of them."""
 
 

@@ -12,7 +12,7 @@ from dobot_async.arms.magician.arm import Jog, Magician
 from dobot_async.arms.magician.params import Pose
 from dobot_async.arms.magician.vocabulary import MODES
 from dobot_async.cli.arms.magician_frames import pieces
-from dobot_async.cli.family import Family, Told
+from dobot_async.cli.family import CommandAnswer, FamilyCommands
 
 __all__ = ["MAGICIAN", "joint_words", "tool_words"]
 
@@ -49,17 +49,17 @@ class MagicianReading:
         }
 
 
-async def magician_info(arm: Magician) -> Told:
+async def magician_info(arm: Magician) -> CommandAnswer:
     """Serial number, name and firmware."""
     found = await arm.get_info()
     text = f"serial number  {found.serial_number}\nname           {found.name}\nfirmware       {found.version}"
-    return Told(found, text)
+    return CommandAnswer(found, text)
 
 
-async def magician_pose(arm: Magician) -> Told:
+async def magician_pose(arm: Magician) -> CommandAnswer:
     """Tool and joints."""
     found = await arm.get_pose()
-    return Told(found, f"{tool_words(found)}  |  {joint_words(found)}")
+    return CommandAnswer(found, f"{tool_words(found)}  |  {joint_words(found)}")
 
 
 async def magician_reading(arm: Magician) -> MagicianReading:
@@ -90,7 +90,7 @@ def joint_words(pose: Pose) -> str:
     return "  ".join(f"{joint} {getattr(pose, joint):7.2f}" for joint in ("j1", "j2", "j3", "j4"))
 
 
-MAGICIAN = Family(
+MAGICIAN = FamilyCommands(
     kind=Magician,
     info=magician_info,
     pose=magician_pose,

@@ -17,7 +17,7 @@ from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.mycobot.frame import Frame, Parser
 from dobot_async.arms.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
 from dobot_async.arms.mycobot.pose import CobotPose
-from dobot_async.cli.family import Family, Pieces, Told
+from dobot_async.cli.family import CommandAnswer, FamilyCommands, Pieces
 from dobot_async.errors import ProtocolError
 from dobot_async.traces.words import REPLY, REQUEST
 
@@ -65,17 +65,19 @@ def joint_words(pose: CobotPose) -> str:
     return "  ".join(f"j{number} {angle:7.2f}" for number, angle in enumerate(pose.joints, 1))
 
 
-async def info(arm: MyCobot) -> Told:
+async def info(arm: MyCobot) -> CommandAnswer:
     """The model, and the versions of its firmware."""
     found = await arm.get_versions()
     versions = [each or "unknown" for each in (found.system_version, found.basic_version)]
-    return Told(found, f"model          {found.model}\nfirmware       {versions[0]}\nM5             {versions[1]}")
+    return CommandAnswer(
+        found, f"model          {found.model}\nfirmware       {versions[0]}\nM5             {versions[1]}"
+    )
 
 
-async def pose(arm: MyCobot) -> Told:
+async def pose(arm: MyCobot) -> CommandAnswer:
     """Tool and joints."""
     found = await arm.get_pose()
-    return Told(found, f"{tool_words(found)}  |  {joint_words(found)}")
+    return CommandAnswer(found, f"{tool_words(found)}  |  {joint_words(found)}")
 
 
 async def read(arm: MyCobot) -> CobotReading:
@@ -152,11 +154,11 @@ def of_model(name: str) -> type[MyCobot]:
     return Model
 
 
-def family(name: str) -> Family:
+def family(name: str) -> FamilyCommands:
     """The entry of a model."""
     model = MODELS[name]
     words = [f"j{joint}" for joint in range(1, model.joints + 1)] + list(AXES[: len(model.reach)])
-    return Family(
+    return FamilyCommands(
         kind=of_model(name),
         info=info,
         pose=pose,

@@ -17,7 +17,7 @@ from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.arm import UltraArm, UltraArmJog
 from dobot_async.arms.ultraarm.frame import errors, split_words
 from dobot_async.arms.ultraarm.params import UltraArmAngles, UltraArmCoords
-from dobot_async.cli.family import Family, Told
+from dobot_async.cli.family import CommandAnswer, FamilyCommands
 from dobot_async.errors import ProtocolError
 from dobot_async.traces.words import REPLY, REQUEST
 
@@ -59,17 +59,17 @@ def axis_words(found: UltraArmCoords | UltraArmAngles) -> str:
     return "  ".join(f"{name} {getattr(found, name):7.2f}" for name in type(found).__dataclass_fields__)
 
 
-async def ultraarm_info(arm: UltraArm) -> Told:
+async def ultraarm_info(arm: UltraArm) -> CommandAnswer:
     """The firmware's version, and the home switches."""
     version, switches = await arm.get_version(), await arm.get_endstops()
     text = f"firmware       {version}\nhome switches  {switches.j1} {switches.j2} {switches.j3}"
-    return Told({"version": version, "endstops": switches}, text)
+    return CommandAnswer({"version": version, "endstops": switches}, text)
 
 
-async def ultraarm_pose(arm: UltraArm) -> Told:
+async def ultraarm_pose(arm: UltraArm) -> CommandAnswer:
     """Tool and joints."""
     coords, angles = await arm.get_coords(), await arm.get_angles()
-    return Told({"coords": coords, "angles": angles}, f"{axis_words(coords)}  |  {axis_words(angles)}")
+    return CommandAnswer({"coords": coords, "angles": angles}, f"{axis_words(coords)}  |  {axis_words(angles)}")
 
 
 async def ultraarm_reading(arm: UltraArm) -> UltraArmReading:
@@ -124,7 +124,7 @@ def named(row: Any) -> dict[str, Any]:
     return {"command": row.name, "section": row.section}
 
 
-ULTRAARM = Family(
+ULTRAARM = FamilyCommands(
     kind=UltraArm,
     info=ultraarm_info,
     pose=ultraarm_pose,

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import click
 
 from dobot_async.cli.arms import FAMILIES, chosen
-from dobot_async.cli.family import Told
+from dobot_async.cli.family import CommandAnswer
 from dobot_async.cli.params import DURATION
-from dobot_async.cli.session import Session
+from dobot_async.cli.session import CommandSession
 
 if TYPE_CHECKING:
     from dobot_async.arms.base import Arm
@@ -22,7 +22,7 @@ ON_OFF = {"on": True, "off": False}
 
 @click.command()
 @click.pass_obj
-def info(session: Session) -> None:
+def info(session: CommandSession) -> None:
     """Tell who the arm is.
 
     Serial number, name and firmware version, as far as it tells them.
@@ -32,7 +32,7 @@ def info(session: Session) -> None:
 
 @click.command()
 @click.pass_obj
-def pose(session: Session) -> None:
+def pose(session: CommandSession) -> None:
     """Tell where tool and joints are, in mm and degrees."""
     answer(session, session.ask(session.family.pose, control=False))
 
@@ -40,7 +40,7 @@ def pose(session: Session) -> None:
 @click.command()
 @click.option("--clear", is_flag=True, help="Clear them. The queue is left as it is.")
 @click.pass_obj
-def alarms(session: Session, clear: bool) -> None:
+def alarms(session: CommandSession, clear: bool) -> None:
     """Tell the alarms, with cause and remedy."""
     if not session.family.alarms:
         session.only(*(name for name, family in FAMILIES.items() if family.alarms))
@@ -57,7 +57,7 @@ def alarms(session: Session, clear: bool) -> None:
 
 @click.command()
 @click.pass_obj
-def home(session: Session) -> None:
+def home(session: CommandSession) -> None:
     """Drive home, which calibrates the arm.
 
     Needed after power-up; takes tens of seconds. What an earlier program left in the arm's queue is thrown away.
@@ -77,7 +77,7 @@ def home(session: Session) -> None:
     "mycobot and its models: to, linear or joints.  [default: movj, to]",
 )
 @click.pass_obj
-def move(session: Session, x: float, y: float, z: float, rest: tuple[float, ...], mode: str | None) -> None:
+def move(session: CommandSession, x: float, y: float, z: float, rest: tuple[float, ...], mode: str | None) -> None:
     """Move the tool to a point.
 
     X Y Z are mm, R is degrees, 0 unless given; an ultraarm's is the fourth joint, which stays unless given. A
@@ -97,7 +97,7 @@ def move(session: Session, x: float, y: float, z: float, rest: tuple[float, ...]
 @click.argument("direction")
 @click.argument("seconds", type=DURATION)
 @click.pass_obj
-def jog(session: Session, direction: str, seconds: float) -> None:
+def jog(session: CommandSession, direction: str, seconds: float) -> None:
     """Jog in a direction for a time.
 
     DIRECTION is one of x+ x- y+ y- z+ z- r+ r-, j1+ j1- to j4-, rail+ rail- (an ultraarm has no r, j4 and rail; a
@@ -112,7 +112,7 @@ def jog(session: Session, direction: str, seconds: float) -> None:
 @click.command()
 @click.argument("state", type=click.Choice(list(ON_OFF)))
 @click.pass_obj
-def suction(session: Session, state: str) -> None:
+def suction(session: CommandSession, state: str) -> None:
     """Switch the suction cup.
 
     On sucks, off lets go and stops the pump. Takes effect at once; what is in the arm's queue goes on.
@@ -127,16 +127,16 @@ def suction(session: Session, state: str) -> None:
 
 @click.command()
 @click.pass_obj
-def stop(session: Session) -> None:
+def stop(session: CommandSession) -> None:
     """Stop the arm now, and empty its queue."""
     session.ask(lambda arm: arm.stop(), queue="keep")
     session.output.answer({"stopped": True}, "stopped")
 
 
-def move_and_answer(session: Session, what: str, motion: Callable[[Arm], Awaitable[None]]) -> None:
+def move_and_answer(session: CommandSession, what: str, motion: Callable[[Arm], Awaitable[None]]) -> None:
     """Waits for a motion, and answers with the pose in which it ended."""
 
-    async def question(arm: Arm) -> Told:
+    async def question(arm: Arm) -> CommandAnswer:
         await motion(arm)
         return await session.family.pose(arm)
 
@@ -146,6 +146,6 @@ def move_and_answer(session: Session, what: str, motion: Callable[[Arm], Awaitab
     answer(session, reached)
 
 
-def answer(session: Session, told: Told) -> None:
+def answer(session: CommandSession, told: CommandAnswer) -> None:
     """Answers with what an arm told."""
     session.output.answer(told.value, told.text)

@@ -13,7 +13,7 @@ from dobot_async.cli.addresses import connectable
 from dobot_async.cli.credentials import own_token
 from dobot_async.cli.extras import needing
 from dobot_async.cli.params import HOST_AND_PORT
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.session import CommandSession, run
 
 if TYPE_CHECKING:
     from dobot_async.bridge import Bridge
@@ -52,7 +52,7 @@ FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
     help="Serve /metrics for Prometheus at HOST:PORT; on another address than this computer's own the token is needed.",
 )
 @click.pass_obj
-def bridge(session: Session, /, token: str | None, token_file: Path | None, **details: Any) -> None:
+def bridge(session: CommandSession, /, token: str | None, token_file: Path | None, **details: Any) -> None:
     """Give the arm at SOURCE_URL to programs on a network, until Ctrl-C.
 
     LISTEN_URL is one or more of tcp://127.0.0.1:9000, udp://127.0.0.1:8899, ws://127.0.0.1:8765, zenoh://NAME and pty;
@@ -71,7 +71,7 @@ def bridge(session: Session, /, token: str | None, token_file: Path | None, **de
 
 
 async def serve(
-    session: Session, *, source: str, token: str | None, metrics: HostAndPort | None = None, **details: Any
+    session: CommandSession, *, source: str, token: str | None, metrics: HostAndPort | None = None, **details: Any
 ) -> None:
     """Runs the bridge until it is cancelled."""
     from dobot_async.bridge import bridge as bridged

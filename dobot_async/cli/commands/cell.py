@@ -17,12 +17,12 @@ from typing import Any, TypeVar
 import click
 
 from dobot_async.cli.cell_program import CellProgram, parse_cell_program, run_cell_program
-from dobot_async.cli.cell_watch import Reading, joined_alone, observe, read, told_by
+from dobot_async.cli.cell_watch import CellReading, joined_alone, observe, read, told_by
 from dobot_async.cli.failures import FAILED, WrongFile
 from dobot_async.cli.output import Output
-from dobot_async.cli.params import ABOVE_ZERO, PROGRAM, Text
+from dobot_async.cli.params import ABOVE_ZERO, PROGRAM, TextSource
 from dobot_async.cli.program_files import wrong
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.session import CommandSession, run
 from dobot_async.cli.trace import tracing
 from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell, parse_cell
@@ -42,7 +42,7 @@ COLUMNS = ("arm", "family", "tool in the cell", "alarms", "link")
 class Chosen:
     """The cell, and how to speak."""
 
-    session: Session
+    session: CommandSession
     cell: Cell
 
     @property
@@ -62,7 +62,7 @@ class Chosen:
 @click.group()
 @click.argument("file", type=PROGRAM)
 @click.pass_context
-def cell(ctx: click.Context, file: Text) -> None:
+def cell(ctx: click.Context, file: TextSource) -> None:
     """Drive all arms of a cell, or watch them.
 
     FILE is a cell file (TOML): arms with their URLs, where they stand, their groups, and zones.
@@ -127,7 +127,7 @@ def stop() -> None:
 @cell.command("run")
 @click.argument("program", type=PROGRAM)
 @click.option("--dry-run", is_flag=True, help="Only check it: no arm is needed, and nothing is sent.")
-def run_program(program: Text, dry_run: bool) -> None:
+def run_program(program: TextSource, dry_run: bool) -> None:
     """Run a program of all arms.
 
     PROGRAM (- is standard input) has lines such as: left: move 200 0 50. Before the colon stand names of arms, or * for
@@ -152,7 +152,7 @@ def run_program(program: Text, dry_run: bool) -> None:
     here.output.answer(answer, f"{program.name}: {sum(counts.values())} commands {done}")
 
 
-def parse(program: Text, cell: Cell) -> CellProgram:
+def parse(program: TextSource, cell: Cell) -> CellProgram:
     """Returns the lines of each arm; raises WrongFile with the line if one is wrong."""
     try:
         steps = parse_cell_program(lines_in(program.text), cell)
@@ -205,7 +205,7 @@ async def alone(
     return dict(zip(members, results, strict=True))
 
 
-def table_text(told: Mapping[str, Reading]) -> str:
+def table_text(told: Mapping[str, CellReading]) -> str:
     """A line for each arm."""
     return "\n".join("  |  ".join(each.cells(name)) for name, each in told.items())
 

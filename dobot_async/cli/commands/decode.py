@@ -10,10 +10,10 @@ from typing import Any
 
 import click
 
-from dobot_async.cli.family import Family
+from dobot_async.cli.family import FamilyCommands
 from dobot_async.cli.output import words
 from dobot_async.cli.params import standard_input
-from dobot_async.cli.session import Session
+from dobot_async.cli.session import CommandSession
 from dobot_async.program.text import LARGEST, lines_in, shortened
 from dobot_async.traces.words import MASK, REPLY, REQUEST
 
@@ -28,7 +28,7 @@ SEPARATORS = re.compile(r"0x|[\s,:;-]+", re.IGNORECASE)
     "--file", type=click.Path(), help="What to decode: a file of --trace, of hexadecimal digits, or of bytes."
 )
 @click.pass_obj
-def decode(session: Session, digits: tuple[str, ...], file: str | None) -> None:
+def decode(session: CommandSession, digits: tuple[str, ...], file: str | None) -> None:
     """Decode the bytes of frames, or lines of text.
 
     They may be of either direction, such as AA AA 02 0A 00 F6. Spaces, commas, colons and 0x may stand between the
@@ -56,7 +56,7 @@ def content(file: str) -> bytes:
         return opened.read(LARGEST)
 
 
-def pieces_in(family: Family, data: bytes) -> Iterator[dict[str, Any]]:
+def pieces_in(family: FamilyCommands, data: bytes) -> Iterator[dict[str, Any]]:
     """Yields the pieces of a trace, of hexadecimal digits, of text, or of bytes."""
     try:
         text = data.decode("utf-8-sig")
@@ -72,7 +72,7 @@ def pieces_in(family: Family, data: bytes) -> Iterator[dict[str, Any]]:
         yield from family.pieces(bytes_in(family, text))
 
 
-def traced_pieces(family: Family, number: int, line: str) -> Iterator[dict[str, Any]]:
+def traced_pieces(family: FamilyCommands, number: int, line: str) -> Iterator[dict[str, Any]]:
     """Yields the pieces of one line of a trace."""
     try:
         told = json.loads(line)
@@ -92,7 +92,7 @@ def traced_pieces(family: Family, number: int, line: str) -> Iterator[dict[str, 
         yield {**also, **piece}
 
 
-def bytes_in(family: Family, text: str) -> bytes:
+def bytes_in(family: FamilyCommands, text: str) -> bytes:
     """The bytes that hexadecimal digits stand for, or those of lines of text, where an arm speaks them."""
     try:
         return bytes.fromhex(SEPARATORS.sub("", text))

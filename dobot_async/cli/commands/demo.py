@@ -23,7 +23,7 @@ from dobot_async.arms.magician.arm import Magician
 from dobot_async.arms.magician.params import Pose, PTPMode
 from dobot_async.cli.arms.magician import joint_words, tool_words
 from dobot_async.cli.params import ABOVE_ZERO
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.session import CommandSession, run
 
 __all__ = ["demo"]
 
@@ -81,7 +81,7 @@ class Summary:
         )
 
 
-class Work:
+class DemoCycle:
     """The demo's own commands, and how far they are."""
 
     def __init__(self, arm: Magician, cycles: int, say: Callable[[str], None]) -> None:
@@ -158,7 +158,7 @@ def ways(cycles: int) -> Iterator[tuple[tuple[float, float], tuple[float, float]
 )
 @click.option("--yes", is_flag=True, help="Do not ask before a real arm moves.")
 @click.pass_obj
-def demo(session: Session, cycles: int, speed: float | None, yes: bool) -> None:
+def demo(session: CommandSession, cycles: int, speed: float | None, yes: bool) -> None:
     """Let a simulated arm pick and place.
 
     It is reached through a (pseudo) serial port. With --url that arm does it, after a question, for it really moves;
@@ -191,7 +191,11 @@ def confirm(url: str) -> None:
 
 
 async def perform(
-    session: Session, url: str | None, cycles: int, speed: float, draw: Callable[[Mapping[str, str]], None] | None
+    session: CommandSession,
+    url: str | None,
+    cycles: int,
+    speed: float,
+    draw: Callable[[Mapping[str, str]], None] | None,
 ) -> Summary:
     """Runs the demo on the arm at a URL, or on a simulated one."""
     from dobot_async.simulator import simulate
@@ -204,7 +208,7 @@ async def perform(
 
         started = time.monotonic()
         arm = await stack.enter_async_context(session.connect(url))
-        work = Work(arm, cycles, (lambda _: None) if draw else session.output.say)
+        work = DemoCycle(arm, cycles, (lambda _: None) if draw else session.output.say)
         async with alongside(watch(arm, work, draw)) if draw else nullcontext():
             await work.perform()
 
@@ -227,7 +231,7 @@ async def perform(
         )
 
 
-async def watch(arm: Magician, work: Work, draw: Callable[[Mapping[str, str]], None]) -> None:
+async def watch(arm: Magician, work: DemoCycle, draw: Callable[[Mapping[str, str]], None]) -> None:
     """Draws how far the work is, until it is cancelled."""
     while True:
         draw(work.rows(await arm.get_pose()))

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import click
 
-from dobot_async.cli.params import ABOVE_ZERO, Place
-from dobot_async.cli.session import Session, run
-from dobot_async.discovery import SOURCES, DiscoveryProblem, Found, Source, discover
+from dobot_async.cli.params import ABOVE_ZERO, AddressType
+from dobot_async.cli.session import CommandSession, run
+from dobot_async.discovery import SOURCES, DiscoveryProblem, DiscoverySource, Found, discover
 from dobot_async.discovery.found import printable
 from dobot_async.discovery.wifi import WiFiModules
 from dobot_async.discovery.zenoh import ZenohArms
@@ -23,7 +23,7 @@ def broadcast_option(command: click.decorators.FC) -> click.decorators.FC:
     """Adds the option that says where to ask in the Wi-Fi."""
     return click.option(
         "--broadcast",
-        type=Place(),
+        type=AddressType(),
         multiple=True,
         metavar="ADDRESS[:PORT]",
         help="Where to ask for arms in the Wi-Fi, in place of the broadcast address of each network; "
@@ -42,7 +42,7 @@ def broadcast_option(command: click.decorators.FC) -> click.decorators.FC:
 )
 @click.pass_obj
 def discover_arms(
-    session: Session,
+    session: CommandSession,
     timeout: float,
     probe: bool,
     names: tuple[str, ...],
@@ -56,7 +56,7 @@ def discover_arms(
     fails, a line on standard error says so, and the others go on.
     """
     session.refuse("a search finds arms of all kinds, wherever they are", "url", "arm", "trace")
-    own: dict[str, Source] = {}
+    own: dict[str, DiscoverySource] = {}
     if broadcast:
         own[WiFiModules.name] = WiFiModules(broadcast)
 

@@ -22,7 +22,7 @@ from dobot_async.cli.drawing_job import Job
 from dobot_async.cli.drawing_options import about_pictures, in_file, with_laser, with_paper, with_pen
 from dobot_async.cli.drawing_paths import of_file, of_text, with_share_of_power
 from dobot_async.cli.failures import WrongFile
-from dobot_async.cli.session import Session
+from dobot_async.cli.session import CommandSession
 from dobot_async.toolpath import MissingLibrary, Toolpath, WorkPlane
 from dobot_async.toolpath.moves import Tool
 
@@ -37,7 +37,7 @@ TOOLS: Mapping[Tool, EndEffectorParams] = {"pen": Pen(), "laser": Laser()}
 @with_pen
 @about_pictures
 @click.pass_obj
-def draw_file(session: Session, /, file: Path, press: float, power: float | None, **given: Any) -> None:
+def draw_file(session: CommandSession, /, file: Path, press: float, power: float | None, **given: Any) -> None:
     """Draw a file with a pen: SVG, DXF, G-code, a picture.
 
     All strokes, the ways between them and the lifts are checked for the arm before anything is sent. An interrupted
@@ -55,7 +55,7 @@ def draw_file(session: Session, /, file: Path, press: float, power: float | None
 @with_laser
 @about_pictures
 @click.pass_obj
-def engrave_file(session: Session, /, file: Path, power: float | None, **given: Any) -> None:
+def engrave_file(session: CommandSession, /, file: Path, power: float | None, **given: Any) -> None:
     """Engrave a picture or a drawing with the laser.
 
     The tool touches the paper where the laser is in focus. All of it is checked for the arm before anything is sent.
@@ -77,7 +77,7 @@ def engrave_file(session: Session, /, file: Path, power: float | None, **given: 
 @with_pen
 @click.pass_obj
 def write_line(
-    session: Session,
+    session: CommandSession,
     /,
     text: str,
     height: float | None,
@@ -107,7 +107,7 @@ def path_of(file: Path, given: Mapping[str, Any]) -> Toolpath:
 
 
 def make(
-    session: Session,
+    session: CommandSession,
     name: str,
     tool: Tool,
     read: Callable[[], Toolpath],
@@ -160,7 +160,7 @@ def refused(name: str) -> Generator[None]:
         raise WrongFile(f"{reason if name in reason else f'{name}: {reason}'}; nothing was sent") from None
 
 
-def speeds(session: Session, given: Mapping[str, Any]) -> dict[str, Any]:
+def speeds(session: CommandSession, given: Mapping[str, Any]) -> dict[str, Any]:
     """How fast, in what the arm knows."""
     knows_percent = issubclass(session.family.kind, MyCobot)
     name, other = ("percent", "speed") if knows_percent else ("speed", "percent")
@@ -171,7 +171,7 @@ def speeds(session: Session, given: Mapping[str, Any]) -> dict[str, Any]:
     return {} if given[name] is None else {name: given[name]}
 
 
-def effector_of(session: Session, tool: Tool, offsets: tuple[float, float, float] | None) -> EndEffectorParams:
+def effector_of(session: CommandSession, tool: Tool, offsets: tuple[float, float, float] | None) -> EndEffectorParams:
     """How the tool sits."""
     if offsets is None:
         return TOOLS[tool]

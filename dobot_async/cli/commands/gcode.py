@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import click
 
 from dobot_async.cli.failures import StepRefused
-from dobot_async.cli.params import PROGRAM, Text
+from dobot_async.cli.params import PROGRAM, TextSource
 from dobot_async.cli.program_files import checked
-from dobot_async.cli.session import Session
+from dobot_async.cli.session import CommandSession
 from dobot_async.program.text import lines_in
 
 __all__ = ["gcode"]
@@ -20,7 +20,7 @@ __all__ = ["gcode"]
 @click.option("--dry-run", is_flag=True, help="Only check it: no arm is needed, and nothing is sent.")
 @click.option("--constant-speed", is_flag=True, help="Run through it at constant speed.")
 @click.pass_obj
-def gcode(session: Session, file: Text, dry_run: bool, constant_speed: bool) -> None:
+def gcode(session: CommandSession, file: TextSource, dry_run: bool, constant_speed: bool) -> None:
     """Run a G-code file on an ultraarm.
 
     FILE may be - for standard input. All lines are checked, against the manual's limits too, before anything is sent. F

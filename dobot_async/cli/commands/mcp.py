@@ -14,7 +14,7 @@ from dobot_async.cli.addresses import connectable
 from dobot_async.cli.commands.bridge import FILE
 from dobot_async.cli.extras import needing
 from dobot_async.cli.params import HOST_AND_PORT
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.session import CommandSession, run
 from dobot_async.cli.sites import of_a_site, site_of, token_of
 
 __all__ = ["mcp"]
@@ -36,7 +36,7 @@ VARIABLE = "DOBOT_MCP_TOKEN"
 @click.option("--certificate", type=FILE, help="PEM file with a certificate: HTTP speaks TLS.")
 @click.option("--key", type=FILE, help="PEM file with its key, if that is in another one.")
 @click.pass_obj
-def mcp(session: Session, /, http: HostAndPort | None, http_token_file: Path | None, **given: Any) -> None:
+def mcp(session: CommandSession, /, http: HostAndPort | None, http_token_file: Path | None, **given: Any) -> None:
     """Give an arm, or those of a cell, to language models, by the Model Context Protocol.
 
     Without --http it talks to one client by standard input and output, and ends with it. Without --allow-motion it
@@ -57,7 +57,7 @@ def mcp(session: Session, /, http: HostAndPort | None, http_token_file: Path | N
 
 
 async def serve(
-    session: Session,
+    session: CommandSession,
     given: dict[str, Any],
     http: HostAndPort | None,
     token: str | None,

@@ -13,7 +13,7 @@ from dobot_async._core.util.hosts import HostAndPort, is_loopback
 from dobot_async.cli.commands.bridge import FILE
 from dobot_async.cli.extras import needing
 from dobot_async.cli.params import ABOVE_ZERO, HOST_AND_PORT
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.session import CommandSession, run
 from dobot_async.cli.sites import names_of, of_a_site, site_of, token_of
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ PASSWORD, METRICS_TOKEN = "DOBOT_MQTT_PASSWORD", "DOBOT_METRICS_TOKEN"
 )
 @click.pass_obj
 def mqtt(
-    session: Session,
+    session: CommandSession,
     /,
     broker: str,
     password_file: Path | None,
@@ -82,7 +82,7 @@ def password_of(file: Path | None) -> str | None:
     return file.read_text(encoding="utf-8").strip("\r\n") if file else os.environ.get(PASSWORD)
 
 
-async def serve(session: Session, given: dict[str, Any], metrics: HostAndPort | None, **details: Any) -> None:
+async def serve(session: CommandSession, given: dict[str, Any], metrics: HostAndPort | None, **details: Any) -> None:
     """Run the gateway until it is cancelled."""
     from dobot_async.mqtt import Gateway
     from dobot_async.remote import Works

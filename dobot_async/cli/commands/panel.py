@@ -16,8 +16,8 @@ import click
 from dobot_async.cli.addresses import connectable
 from dobot_async.cli.credentials import token_in_file
 from dobot_async.cli.failures import WrongFile
-from dobot_async.cli.params import PROGRAM, Text
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.params import PROGRAM, TextSource
+from dobot_async.cli.session import CommandSession, run
 
 __all__ = ["panel"]
 
@@ -39,7 +39,9 @@ TOKENS = {"operator": "DOBOT_PANEL_OPERATOR", "viewer": "DOBOT_PANEL_VIEWER"}
 @click.option("--key", type=FILE, help="PEM file with its key, if that is in another one.")
 @click.option("--qr/--no-qr", default=True, help="Show the address as a QR code, for a phone.")
 @click.pass_obj
-def panel(session: Session, /, more: tuple[str, ...], cell_file: Text | None, qr: bool, **options: Any) -> None:
+def panel(
+    session: CommandSession, /, more: tuple[str, ...], cell_file: TextSource | None, qr: bool, **options: Any
+) -> None:
     """Show arms in the browser, until Ctrl-C.
 
     One arm by its URL as for every command, several as left=URL right=URL, or those of a cell file. sim: is simulated
@@ -80,7 +82,7 @@ def tokens_of(**files: Path | None) -> dict[str, str | None]:
     return found
 
 
-def chosen(session: Session, more: tuple[str, ...], cell_file: Text | None) -> Any:
+def chosen(session: CommandSession, more: tuple[str, ...], cell_file: TextSource | None) -> Any:
     """Return which arms: their URLs by name, or a cell; raise UsageError if that is not said, or twice."""
     if cell_file:
         session.refuse("a cell file has the URLs of the arms, and their families", "url", "arm")
@@ -104,7 +106,7 @@ def chosen(session: Session, more: tuple[str, ...], cell_file: Text | None) -> A
     return urls
 
 
-def cell_of(file: Text) -> Any:
+def cell_of(file: TextSource) -> Any:
     """Return what is in a cell file; raise WrongFile if that is wrong."""
     from dobot_async.fleet.cell import parse_cell
 
@@ -115,7 +117,7 @@ def cell_of(file: Text) -> Any:
 
 
 @asynccontextmanager
-async def connected(session: Session, arms: Any) -> AsyncGenerator[tuple[Any, Any], None]:
+async def connected(session: CommandSession, arms: Any) -> AsyncGenerator[tuple[Any, Any], None]:
     """Yield what a panel is given, and the scene; a cell is connected as a whole."""
     from dobot_async.arms.mycobot.arm import MyCobot
     from dobot_async.fleet import Fleet
@@ -156,7 +158,7 @@ def simulated(arm: str) -> Any:
     return simulate(arm, scene=scene)
 
 
-async def serve(session: Session, arms: Any, *, qr: bool, secret: bool, **options: Any) -> None:
+async def serve(session: CommandSession, arms: Any, *, qr: bool, secret: bool, **options: Any) -> None:
     """Run the panel until it is cancelled."""
     from dobot_async.panel import panel as opened
 

@@ -18,9 +18,9 @@ from typing import Any
 import click
 
 from dobot_async.arms.registry import REGISTERED
-from dobot_async.cli.params import PROGRAM, Text
+from dobot_async.cli.params import PROGRAM, TextSource
 from dobot_async.cli.program_files import checked, execute
-from dobot_async.cli.session import Session
+from dobot_async.cli.session import CommandSession
 from dobot_async.program import VOCABULARIES, Step
 from dobot_async.program.text import lines_in
 
@@ -42,7 +42,7 @@ class RunCommand(click.Command):
 @click.option("--download", is_flag=True, help="Store it in a magician, which runs it when its key is pressed.")
 @click.option("--loops", type=click.IntRange(1), help="How often the arm runs what is stored.  [default: 1]")
 @click.pass_obj
-def run_program(session: Session, file: Text, dry_run: bool, download: bool, loops: int | None) -> None:
+def run_program(session: CommandSession, file: TextSource, dry_run: bool, download: bool, loops: int | None) -> None:
     """Run a program file.
 
     FILE (- is standard input) has one verb a line, as in: move 200 0 50 mode=movl. All lines are checked for the arm,

@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 import click
 
 from dobot_async.cli.commands.bridge import FILE, GROUPS, serve
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.session import CommandSession, run
 
 __all__ = ["serve_on_zenoh"]
 
@@ -32,7 +32,7 @@ __all__ = ["serve_on_zenoh"]
 @click.option("--deny", multiple=True, type=click.Choice(GROUPS), help="Commands that nobody may send; repeatable.")
 @click.pass_obj
 def serve_on_zenoh(
-    session: Session,
+    session: CommandSession,
     /,
     name: str,
     config: Path | None,

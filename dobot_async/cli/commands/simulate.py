@@ -9,8 +9,8 @@ from typing import Any
 import click
 
 from dobot_async.cli.addresses import connectable
-from dobot_async.cli.params import ABOVE_ZERO, Place
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.params import ABOVE_ZERO, AddressType
+from dobot_async.cli.session import CommandSession, run
 
 __all__ = ["simulate"]
 
@@ -47,7 +47,7 @@ def faults(command: click.decorators.FC) -> click.decorators.FC:
 @click.option("--seed", type=int, help="Of the faults, to have the same ones again.")
 @click.option(
     "--announce",
-    type=Place(),
+    type=AddressType(),
     metavar="ADDRESS[:PORT]",
     help="Answer searches for arms there, as an arm in the Wi-Fi does; 0.0.0.0 hears all broadcasts. "
     "The arm has to listen at port 8899, as in --listen udp://0.0.0.0:8899.",
@@ -55,7 +55,7 @@ def faults(command: click.decorators.FC) -> click.decorators.FC:
 @faults
 @click.pass_obj
 def simulate(
-    session: Session,
+    session: CommandSession,
     /,
     listen: str,
     speed: float,
@@ -74,7 +74,7 @@ def simulate(
 
 
 async def serve(
-    session: Session,
+    session: CommandSession,
     arm: str,
     *,
     listen: str,

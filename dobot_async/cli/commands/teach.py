@@ -14,7 +14,7 @@ from dobot_async.arms.registry import REGISTERED
 from dobot_async.cli.arms import FAMILIES
 from dobot_async.cli.failures import StepRefused, WrongFile
 from dobot_async.cli.params import ABOVE_ZERO, DURATION
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.session import CommandSession, run
 
 if TYPE_CHECKING:
     from dobot_async.arms.base import Arm
@@ -35,7 +35,7 @@ PLAYBACK = ".playback"
 @click.option("--tool", default="", help="What is on the arm, in your words.")
 @click.option("--yes", is_flag=True, help="Release the joints of an arm for --hand without asking.")
 @click.pass_obj
-def teach(session: Session, /, file: Path, speed: float, tool: str, **options: Any) -> None:
+def teach(session: CommandSession, /, file: Path, speed: float, tool: str, **options: Any) -> None:
     """Teach the arm, and keep that in a file.
 
     FILE is JSON, or a file for DobotStudio if its name ends with .playback; one that is there is gone on with. The
@@ -74,7 +74,7 @@ def teach(session: Session, /, file: Path, speed: float, tool: str, **options: A
 
 
 def check_options(
-    session: Session,
+    session: CommandSession,
     before: Any,
     *,
     hand: bool,
@@ -108,7 +108,7 @@ def check_options(
 
 
 async def taught_by(
-    session: Session,
+    session: CommandSession,
     file: Path,
     before: Any,
     kept: list[Any],
@@ -160,7 +160,7 @@ def keep(recording: Any, file: Path) -> Path:
     return file
 
 
-async def by_keys(session: Session, recorder: Any, speed: float) -> None:
+async def by_keys(session: CommandSession, recorder: Any, speed: float) -> None:
     """Let the keys of the terminal jog."""
     from dobot_async.cli.keys import keys_of
     from dobot_async.cli.pendant import Pendant
@@ -172,7 +172,7 @@ async def by_keys(session: Session, recorder: Any, speed: float) -> None:
             await Pendant(recorder, player, keys, session.output.say, speed).run()
 
 
-async def by_key(session: Session, recorder: Any, count: int | None) -> None:
+async def by_key(session: CommandSession, recorder: Any, count: int | None) -> None:
     """Take a point each time that the key on the forearm is released."""
     from dobot_async.cli.keys import until_a_key
 
@@ -188,7 +188,7 @@ async def by_key(session: Session, recorder: Any, count: int | None) -> None:
                 break
 
 
-async def by_hand(session: Session, recorder: Any, rate: float, seconds: float | None) -> None:
+async def by_hand(session: CommandSession, recorder: Any, rate: float, seconds: float | None) -> None:
     """Record what a released arm is led through."""
     from dobot_async.cli.keys import until_a_key
     from dobot_async.teaching import released
@@ -236,7 +236,9 @@ def words(file: Path, kept: list[Any]) -> str:
 @click.option("--reverse", is_flag=True, help="From the end to the beginning; what was taken is put down.")
 @click.option("--dry-run", is_flag=True, help="Only check it: no arm is needed, and nothing is sent.")
 @click.pass_obj
-def play_recording(session: Session, file: Path, speed: float | None, loop: int, reverse: bool, dry_run: bool) -> None:
+def play_recording(
+    session: CommandSession, file: Path, speed: float | None, loop: int, reverse: bool, dry_run: bool
+) -> None:
     """Play what an arm was taught.
 
     FILE is what `teach` has written, or a .playback file of DobotStudio. All of it is checked before anything moves:
@@ -281,7 +283,7 @@ def play_recording(session: Session, file: Path, speed: float | None, loop: int,
     session.output.answer(answer, f"{file.name}: played")
 
 
-def choose_arm(session: Session, file: Path, recording: Any) -> None:
+def choose_arm(session: CommandSession, file: Path, recording: Any) -> None:
     """Take the arm that is in a file, unless one was given; raises WrongFile if that is of another family."""
     recorded = recording.model or recording.family
     if recorded not in FAMILIES:

@@ -19,7 +19,7 @@ import click
 
 from dobot_async.cli.failures import StepRefused, WrongFile
 from dobot_async.cli.params import ABOVE_ZERO
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.session import CommandSession, run
 from dobot_async.following import RATE, Follow
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ CHUNK = 4096
 @click.option("--joints", is_flag=True, help="The numbers are joint angles, in degrees; not with keys.")
 @click.option("--play", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Follow a trajectory.")
 @click.pass_obj
-def teleop(session: Session, rate: float, max_speed: float, joints: bool, play: Path | None) -> None:
+def teleop(session: CommandSession, rate: float, max_speed: float, joints: bool, play: Path | None) -> None:
     """Lead the arm by keys, or by targets from a pipe.
 
     On a terminal: w s go along x, a d along y, r f along z, q e turn; the arm goes while a key is held, and x or Esc

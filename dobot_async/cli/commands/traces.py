@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from dobot_async.cli.output import words
-from dobot_async.cli.session import Session
+from dobot_async.cli.session import CommandSession
 from dobot_async.traces.figures import CommandFigures, Figures, figures, percentile
 from dobot_async.traces.reader import Trace, TraceLine, TraceProblem, read_trace
 
@@ -39,7 +39,7 @@ def trace() -> None:
 @click.option("--kind", "kinds", multiple=True, metavar="KIND", help="Only frame, junk, motion, state, event, ...")
 @click.option("--last", type=click.IntRange(1), help="Only so many lines, the last ones.")
 @click.pass_obj
-def show(session: Session, file: Path, of: str | None, kinds: tuple[str, ...], last: int | None) -> None:
+def show(session: CommandSession, file: Path, of: str | None, kinds: tuple[str, ...], last: int | None) -> None:
     """Show what went over the connection, a line each."""
     found = read(session, file)
     lines = [line for line in found.lines if (of is None or line.arm == of) and (not kinds or line.kind in kinds)]
@@ -53,7 +53,7 @@ def show(session: Session, file: Path, of: str | None, kinds: tuple[str, ...], l
 @OF
 @CONNECTION
 @click.pass_obj
-def stats(session: Session, file: Path, of: str | None, connection: int) -> None:
+def stats(session: CommandSession, file: Path, of: str | None, connection: int) -> None:
     """Tell latencies, losses, repetitions, and what became of each motion."""
     found = figures(part(read(session, file), of, connection))
     session.output.answer(summary(found), "\n".join(stats_text(found)))
@@ -65,7 +65,7 @@ def stats(session: Session, file: Path, of: str | None, connection: int) -> None
 @CONNECTION
 @click.option("--png", type=click.Path(dir_okay=False, path_type=Path), help="Draw into a picture. Needs matplotlib.")
 @click.pass_obj
-def plot(session: Session, file: Path, of: str | None, connection: int, png: Path | None) -> None:
+def plot(session: CommandSession, file: Path, of: str | None, connection: int, png: Path | None) -> None:
     """Draw how full the queue was, and how long the answers took."""
     from dobot_async.traces.plot import MissingPlotter, in_terminal, to_png
 
@@ -84,7 +84,7 @@ def plot(session: Session, file: Path, of: str | None, connection: int, png: Pat
 
 @trace.command()
 @click.pass_obj
-def dissector(session: Session) -> None:
+def dissector(session: CommandSession) -> None:
     """Print the dissector for Wireshark, in Lua, with the command tables of all families.
 
     It belongs into the folder of Wireshark's personal Lua plugins.
@@ -94,7 +94,7 @@ def dissector(session: Session) -> None:
     session.output.answer({"lua": source()}, source())
 
 
-def read(session: Session, file: Path) -> Trace:
+def read(session: CommandSession, file: Path) -> Trace:
     """Reads a trace; a file that is none is wrong usage."""
     session.refuse("a trace is only read", "url", "arm", "trace")
     try:

@@ -15,7 +15,7 @@ import click
 
 from dobot_async.cli.commands.discover import broadcast_option
 from dobot_async.cli.params import ABOVE_ZERO
-from dobot_async.cli.session import Session, run
+from dobot_async.cli.session import CommandSession, run
 from dobot_async.discovery.families import probe_magician
 from dobot_async.discovery.found import Found
 from dobot_async.discovery.wifi import PORT, WiFiModules
@@ -53,7 +53,7 @@ class Joined:
 @broadcast_option
 @click.pass_obj
 def set_up_wifi(
-    session: Session,
+    session: CommandSession,
     ssid: str,
     is_open: bool,
     address: str | None,

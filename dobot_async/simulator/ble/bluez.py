@@ -14,8 +14,8 @@ from typing import Any
 
 from dbus_fast import Message, MessageType
 
-from dobot_async.simulator.ble.module import Module
-from dobot_async.simulator.ble.names import ADAPTER, CHARACTERISTIC, DEVICE, TYPES, Refused
+from dobot_async.simulator.ble.module import BleModule
+from dobot_async.simulator.ble.names import ADAPTER, CHARACTERISTIC, DEVICE, TYPES, DBusRefusal
 from dobot_async.simulator.ble.system_bus import OBJECT_MANAGER, PROPERTIES, Objects, PatientBus
 
 __all__ = ["BlueZ"]
@@ -33,7 +33,7 @@ class BlueZ:
     def __init__(self, bus: PatientBus) -> None:
         self._bus = bus
         self._scanning: set[str] = set()
-        self._modules: dict[str, Module] = {}
+        self._modules: dict[str, BleModule] = {}
         self.objects = Objects(bus, TYPES)
 
     async def start(self) -> None:
@@ -63,12 +63,12 @@ class BlueZ:
         self._modules.clear()
         await self._bus.close()
 
-    def add(self, module: Module) -> None:
+    def add(self, module: BleModule) -> None:
         """Brings a module into the world."""
         module.join(self, HCI)
         self._modules[module.path] = module
 
-    def remove(self, module: Module) -> None:
+    def remove(self, module: BleModule) -> None:
         """Takes a module out of the world."""
         if self._modules.pop(module.path, None):
             module.lose()
@@ -98,7 +98,7 @@ class BlueZ:
         if self._bus.connected:
             self._bus.send(Message.new_method_return(call, signature, list(body)))
 
-    def refuse(self, call: Message, refused: Refused) -> None:
+    def refuse(self, call: Message, refused: DBusRefusal) -> None:
         """Answers a call with an error."""
         if self._bus.connected:
             self._bus.send(Message.new_error(call, refused.name, refused.text))
@@ -120,7 +120,7 @@ class BlueZ:
         """Properties.Set: the adapter can be switched."""
         interface, name, value = call.body
         if (interface, name) != (ADAPTER, "Powered"):
-            raise Refused("org.freedesktop.DBus.Error.PropertyReadOnly", name)
+            raise DBusRefusal("org.freedesktop.DBus.Error.PropertyReadOnly", name)
 
         self.power(on=value.value)
         self.answer(call)
@@ -134,7 +134,7 @@ class BlueZ:
         """Adapter1.StartDiscovery."""
         self._ready()
         if call.sender in self._scanning:
-            raise Refused("org.bluez.Error.InProgress", "Operation already in progress")
+            raise DBusRefusal("org.bluez.Error.InProgress", "Operation already in progress")
 
         self._scanning.add(call.sender or "")
         for module in self._modules.values():
@@ -146,7 +146,7 @@ class BlueZ:
         """Adapter1.StopDiscovery."""
         self._ready()
         if call.sender not in self._scanning:
-            raise Refused("org.bluez.Error.Failed", "No discovery started")
+            raise DBusRefusal("org.bluez.Error.Failed", "No discovery started")
 
         self._scanning.discard(call.sender or "")
         self.answer(call)
@@ -187,7 +187,7 @@ class BlueZ:
 
         try:
             handler(self, message)
-        except Refused as refused:
+        except DBusRefusal as refused:
             self.refuse(message, refused)
 
         return True
@@ -198,17 +198,17 @@ class BlueZ:
         for module in self._modules.values():
             module.stop_notify(client)
 
-    def _module(self, call: Message) -> Module:
+    def _module(self, call: Message) -> BleModule:
         """The module whose object is called."""
         for path, module in self._modules.items():
             if call.path and f"{call.path}/".startswith(f"{path}/") and call.path in self.objects:
                 return module
 
-        raise Refused(UNKNOWN, f"Method {call.member} does not exist at {call.path}")
+        raise DBusRefusal(UNKNOWN, f"Method {call.member} does not exist at {call.path}")
 
     def _ready(self) -> None:
         if not self.powered:
-            raise Refused("org.bluez.Error.NotReady", "Resource Not Ready")
+            raise DBusRefusal("org.bluez.Error.NotReady", "Resource Not Ready")
 
 
 HANDLERS: dict[tuple[str | None, str | None], Callable[[BlueZ, Message], None]] = {

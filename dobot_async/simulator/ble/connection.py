@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 from dbus_fast import Message
 
-from dobot_async.simulator.ble.link_layer import Air, Line, Radio
-from dobot_async.simulator.simulation import Client, Simulation
+from dobot_async.simulator.ble.link_layer import Air, RadioSettings, SerialBridge
+from dobot_async.simulator.simulation import SimulatedClient, Simulation
 
-__all__ = ["CONNECT", "SUBSCRIBE", "WRITE", "Connection"]
+__all__ = ["CONNECT", "SUBSCRIBE", "WRITE", "GattConnection"]
 
 CONNECT, WRITE, SUBSCRIBE = "connect", "write", "subscribe"
 BROKEN = {
@@ -21,7 +21,7 @@ BROKEN = {
 """What BlueZ says of the calls that wait when it breaks."""
 
 
-class Connection:
+class GattConnection:
     """One connection: what is on its way, the calls that wait for it, and what happens later if it lasts.
 
     Attributes:
@@ -29,9 +29,9 @@ class Connection:
         line: To the arm, once the connection is there.
     """
 
-    def __init__(self, radio: Radio) -> None:
+    def __init__(self, radio: RadioSettings) -> None:
         self.air = Air(radio)
-        self.line: Line | None = None
+        self.line: SerialBridge | None = None
         self._loop = asyncio.get_running_loop()
         self._waiting: dict[str, Message] = {}
         self._timers: list[asyncio.TimerHandle] = []
@@ -46,8 +46,8 @@ class Connection:
             line.cut()
             unplugged()
 
-        line = self.line = Line(deliver, say, lambda: simulation.leave(client))
-        client: Client = simulation.client(line.answer, unplug, ordered=True)
+        line = self.line = SerialBridge(deliver, say, lambda: simulation.leave(client))
+        client: SimulatedClient = simulation.client(line.answer, unplug, ordered=True)
 
     def waits(self, what: str) -> bool:
         """Whether a call of a kind waits."""

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["Air", "Line", "Radio", "Uart", "round_trip"]
+__all__ = ["Air", "RadioSettings", "SerialBridge", "Uart", "round_trip"]
 
 BAUD_PER_BYTE = 10 / 115200
 LEAST_MTU, MOST_MTU = 23, 517
@@ -23,7 +23,7 @@ ATT_HEADER = 3
 
 
 @dataclass(slots=True)
-class Radio:
+class RadioSettings:
     """How good a connection is; may be changed while the simulation runs.
 
     Attributes:
@@ -56,7 +56,7 @@ class Radio:
 class Air:
     """One connection: what waits for its next event, each way."""
 
-    def __init__(self, radio: Radio) -> None:
+    def __init__(self, radio: RadioSettings) -> None:
         self._radio = radio
         self._loop = asyncio.get_running_loop()
         self._began = self._loop.time()
@@ -143,7 +143,7 @@ class Uart:
         self._timers.clear()
 
 
-class Line:
+class SerialBridge:
     """The serial line of one connection to the arm: what has reached the module goes on, even if the air is gone.
 
     Args:
@@ -187,7 +187,7 @@ class Line:
             self._leave()
 
 
-def round_trip(radio: Radio, request: int, reply: int, pace: float) -> float:
+def round_trip(radio: RadioSettings, request: int, reply: int, pace: float) -> float:
     """Returns the least seconds from a request that is sent right after an event to the last packet of its answer.
 
     Args:

@@ -15,8 +15,8 @@ from functools import partial
 
 from dbus_fast import Message
 
-from dobot_async.simulator.ble.connection import CONNECT, SUBSCRIBE, WRITE, Connection
-from dobot_async.simulator.ble.link_layer import Radio
+from dobot_async.simulator.ble.connection import CONNECT, SUBSCRIBE, WRITE, GattConnection
+from dobot_async.simulator.ble.link_layer import RadioSettings
 from dobot_async.simulator.ble.names import (
     CHARACTERISTIC,
     DEVICE,
@@ -24,20 +24,20 @@ from dobot_async.simulator.ble.names import (
     NOTIFIES_PATH,
     SERVICE_UUID,
     WRITES_PATH,
-    Refused,
+    DBusRefusal,
     Service,
     device,
     services,
 )
 from dobot_async.simulator.simulation import Simulation
 
-__all__ = ["Module"]
+__all__ = ["BleModule"]
 
 CONNECTING, RESOLVING, SUBSCRIBING = 2, 4, 2  # connection events that these take
 NOBODY = 2.0  # seconds after which BlueZ gives up to connect to somebody who is not there
 
 
-class Module:
+class BleModule:
     """One arm's BLE module.
 
     Attributes:
@@ -59,7 +59,7 @@ class Module:
         connections: How many there have been.
     """
 
-    def __init__(self, simulation: Simulation, radio: Radio, *, name: str, address: str) -> None:
+    def __init__(self, simulation: Simulation, radio: RadioSettings, *, name: str, address: str) -> None:
         self.radio = radio
         self.name = name
         self.address = address
@@ -80,7 +80,7 @@ class Module:
         self._simulation = simulation
         self._loop = asyncio.get_running_loop()
         self._bluez: Service | None = None
-        self._connection: Connection | None = None
+        self._connection: GattConnection | None = None
         self._listeners: set[str] = set()
         self._heard = 0
         self._timers: set[asyncio.TimerHandle] = set()
@@ -121,7 +121,7 @@ class Module:
             calls = self._break()
             bluez.objects.change(self.path, DEVICE, Connected=False, ServicesResolved=False)
             for call, text in calls:
-                bluez.refuse(call, Refused(FAILED, text))
+                bluez.refuse(call, DBusRefusal(FAILED, text))
 
             self.advertise()
 
@@ -157,9 +157,9 @@ class Module:
         if self.connected:
             self._bluez.answer(call)
         elif self._connection:
-            raise Refused("org.bluez.Error.InProgress", "In Progress")
+            raise DBusRefusal("org.bluez.Error.InProgress", "In Progress")
         else:
-            connection = self._connection = Connection(self.radio)
+            connection = self._connection = GattConnection(self.radio)
             connection.wait(CONNECT, call)
             self.watch("connect")
             if self._connection is connection and self.in_range and not self.taken:
@@ -173,7 +173,7 @@ class Module:
         bluez = self._bluez
         connection = self._connection
         if not connection:
-            raise Refused("org.bluez.Error.NotConnected", "Not Connected")
+            raise DBusRefusal("org.bluez.Error.NotConnected", "Not Connected")
 
         def done() -> None:
             if self._connection is connection:
@@ -192,15 +192,15 @@ class Module:
         kind = options["type"].value
         flag = {"command": "write-without-response", "request": "write"}[kind]
         if self._connection and self._connection.waits(WRITE):
-            raise Refused("org.bluez.Error.InProgress", "In Progress")
+            raise DBusRefusal("org.bluez.Error.InProgress", "In Progress")
 
         connection = self._ready("write")
         assert self._bluez
         if flag not in self.writes or not (call.path or "").endswith(WRITES_PATH):
-            raise Refused("org.bluez.Error.NotSupported", "Operation is not supported")
+            raise DBusRefusal("org.bluez.Error.NotSupported", "Operation is not supported")
 
         if kind == "command" and len(data) > self.radio.payload:
-            raise Refused(FAILED, "Failed to initiate write")
+            raise DBusRefusal(FAILED, "Failed to initiate write")
 
         self.written.append(bytes(data))
         self.kinds.append(kind)
@@ -216,7 +216,7 @@ class Module:
         """GattCharacteristic1.StartNotify."""
         connection = self._ready("start_notify")
         if call.sender in self._listeners or connection.waits(SUBSCRIBE):
-            raise Refused("org.bluez.Error.InProgress", "In Progress")
+            raise DBusRefusal("org.bluez.Error.InProgress", "In Progress")
 
         connection.wait(SUBSCRIBE, call)
         connection.in_events(SUBSCRIBING, partial(self._subscribed, call.sender or ""))
@@ -228,11 +228,11 @@ class Module:
             if self._bluez and not self._listeners:
                 self._bluez.objects.change(f"{self.path}/{NOTIFIES_PATH}", CHARACTERISTIC, Notifying=False)
 
-    def _ready(self, step: str) -> Connection:
+    def _ready(self, step: str) -> GattConnection:
         """Announces a step, and returns the connection, without which it cannot be taken."""
         self.watch(step)
         if not self._connection or not self._connection.line:
-            raise Refused(FAILED, "Not connected")
+            raise DBusRefusal(FAILED, "Not connected")
 
         return self._connection
 

@@ -18,7 +18,7 @@ __all__ = [
     "SERVICE_UUID",
     "TYPES",
     "WRITES_PATH",
-    "Refused",
+    "DBusRefusal",
     "Service",
     "device",
     "services",
@@ -45,7 +45,7 @@ TYPES = {
 }
 
 
-class Refused(Exception):
+class DBusRefusal(Exception):
     """BlueZ answers a call with an error."""
 
     def __init__(self, name: str, text: str) -> None:
@@ -67,7 +67,7 @@ class Service(Protocol):
     def answer(self, call: Message, signature: str = "", *body: Any) -> None:
         """Answers a call."""
 
-    def refuse(self, call: Message, refused: Refused) -> None:
+    def refuse(self, call: Message, refused: DBusRefusal) -> None:
         """Answers a call with an error."""
 
 

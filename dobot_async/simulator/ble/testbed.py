@@ -16,17 +16,17 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from dobot_async.simulator.ble.bluez import BlueZ
-from dobot_async.simulator.ble.link_layer import Radio
-from dobot_async.simulator.ble.module import Module
+from dobot_async.simulator.ble.link_layer import RadioSettings
+from dobot_async.simulator.ble.module import BleModule
 from dobot_async.simulator.ble.system_bus import ADDRESS, PatientBus, dbus_daemon
 from dobot_async.simulator.simulation import Simulation
 
-__all__ = ["Rig", "forget_bus", "rig", "serve"]
+__all__ = ["BlueZTestbed", "forget_bus", "rig", "serve"]
 
 FIRST_ADDRESS = 0xD8B04CB33868  # in the range of the module's maker
 
 
-class Rig:
+class BlueZTestbed:
     """A bus, BlueZ on it, and the modules in its world.
 
     Attributes:
@@ -39,7 +39,7 @@ class Rig:
         self.bluez: BlueZ | None = None
         self._address = address
         self._daemon = daemon
-        self._modules: list[Module] = []
+        self._modules: list[BleModule] = []
         self._numbers = itertools.count()
 
     async def start(self) -> None:
@@ -62,18 +62,18 @@ class Rig:
         await self._daemon.wait()
 
     def add(
-        self, simulation: Simulation, radio: Radio | None = None, *, name: str = "WH-BLE 102", address: str = ""
-    ) -> Module:
+        self, simulation: Simulation, radio: RadioSettings | None = None, *, name: str = "WH-BLE 102", address: str = ""
+    ) -> BleModule:
         """Gives an arm a BLE module; the address is made up unless given."""
         address = address or (FIRST_ADDRESS + next(self._numbers)).to_bytes(6, "big").hex(":").upper()
-        module = Module(simulation, radio or Radio(), name=name, address=address)
+        module = BleModule(simulation, radio or RadioSettings(), name=name, address=address)
         self._modules.append(module)
         if self.bluez:
             self.bluez.add(module)
 
         return module
 
-    def remove(self, module: Module) -> None:
+    def remove(self, module: BleModule) -> None:
         """Takes an arm's module away."""
         self._modules.remove(module)
         if self.bluez:
@@ -81,14 +81,14 @@ class Rig:
 
 
 @asynccontextmanager
-async def rig() -> AsyncGenerator[Rig]:
+async def rig() -> AsyncGenerator[BlueZTestbed]:
     """Runs a rig for the length of a block; this process, and what it starts, takes its bus for the system's.
 
     Raises:
         OSError: dbus-daemon is not installed, or does not start.
     """
     async with dbus_daemon() as (address, daemon):
-        made = Rig(address, daemon)
+        made = BlueZTestbed(address, daemon)
         before = os.environ.get(ADDRESS)
         os.environ[ADDRESS] = address
         try:
@@ -123,10 +123,10 @@ class Shared:
         self._changing = asyncio.Lock()
         self._users = 0
         self._stack = AsyncExitStack()
-        self._rig: Rig | None = None
+        self._rig: BlueZTestbed | None = None
 
     @asynccontextmanager
-    async def use(self) -> AsyncGenerator[Rig]:
+    async def use(self) -> AsyncGenerator[BlueZTestbed]:
         """Yields the rig; the first one starts it, the last one ends it."""
         async with self._changing:
             if self._rig is None:
@@ -156,7 +156,7 @@ async def serve(
     **radio: Any,
 ) -> str:
     """Gives a simulation a BLE module until the stack is closed; returns its URL."""
-    air = Radio(**radio)
+    air = RadioSettings(**radio)
     shared = rigs.setdefault(asyncio.get_running_loop(), Shared())
     world = await stack.enter_async_context(shared.use())
     module = world.add(simulation, air, name=name, address=address)

@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from dobot_async.simulator.device.work import Fault, Vector
+from dobot_async.simulator.device.work import DeviceFault, Vector
 
-__all__ = ["SAME_PLACE", "Arc", "Curve", "Line", "arc", "between", "circle"]
+__all__ = ["SAME_PLACE", "Arc", "Curve", "LineSegment", "arc", "between", "circle"]
 
 REPEATED_POINTS, BAD_ARC = 0x13, 0x14
 COLLINEAR = 1e-6  # sine of the angle below which three points are one line
@@ -38,7 +38,7 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LineSegment:
     """Straight from one point to another."""
 
     start: Vector
@@ -104,12 +104,12 @@ def arc(start: Vector, through: Vector, end: Vector) -> Arc:
     """
     first, last = minus(through, start), minus(end, start)
     if min(math.hypot(*first), math.hypot(*last), math.dist(through[:3], end[:3])) < SAME_PLACE:
-        raise Fault(REPEATED_POINTS)
+        raise DeviceFault(REPEATED_POINTS)
 
     normal = cross(first, last)
     square = dot(normal, normal)
     if math.sqrt(square) < COLLINEAR * math.hypot(*first) * math.hypot(*last):
-        raise Fault(BAD_ARC)
+        raise DeviceFault(BAD_ARC)
 
     weighted = tuple(dot(first, first) * b - dot(last, last) * a for a, b in zip(first, last, strict=True))
     to_centre = tuple(value / (2 * square) for value in cross(weighted, normal))

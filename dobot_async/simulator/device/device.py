@@ -13,10 +13,29 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable
 from typing import Protocol
 
-from dobot_async.simulator.device.timeline import Course
-from dobot_async.simulator.device.work import NO_INDEX, Activity, DeviceOptions, Executed, Fault, Outcome, Vector, Work
+from dobot_async.simulator.device.timeline import Timeline
+from dobot_async.simulator.device.work import (
+    NO_INDEX,
+    Activity,
+    DeviceFault,
+    DeviceOptions,
+    Executed,
+    Outcome,
+    Vector,
+    Work,
+)
 
-__all__ = ["Activity", "Device", "DeviceOptions", "Executed", "Fault", "Outcome", "Surroundings", "Vector", "Work"]
+__all__ = [
+    "Activity",
+    "Device",
+    "DeviceFault",
+    "DeviceOptions",
+    "Executed",
+    "Outcome",
+    "Surroundings",
+    "Vector",
+    "Work",
+]
 
 
 class Surroundings(Protocol):
@@ -50,7 +69,7 @@ class Device:
         self._clock = clock
         self._inputs: dict[Hashable, float] = {}
         self._garbage_reads = 0
-        self._course = Course(
+        self._course = Timeline(
             self.options, clock(), tuple(joints), lambda work: work.begin(self), finished=self._finished
         )
         self._queue = self._course.queue

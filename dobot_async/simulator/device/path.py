@@ -4,9 +4,9 @@
     Curve ----curve_leg--> Leg --+--travel--> Activity
     jump(...) -----------> Legs -'
 
-A joint vector has any length; kinematics come as a `Solver`. The end of a curve has to be within reach, or planning
-raises the solver's Fault. On the way the reach is looked at every few mm and degrees, and a leg that leaves it ends at
-that place, with the fault of the way (Dobot's codes: that of the plan and 0x10).
+A joint vector has any length; kinematics come as a `JointSolver`. The end of a curve has to be within reach, or
+planning raises the solver's fault. On the way the reach is looked at every few mm and degrees, and a leg that leaves it
+ends at that place, with the fault of the way (Dobot's codes: that of the plan and 0x10).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Protocol
 
-from dobot_async.simulator.device.curve import SAME_PLACE, Curve, Line, between
-from dobot_async.simulator.device.profile import Pace, Profile, shared
-from dobot_async.simulator.device.work import Activity, Fault, Vector
+from dobot_async.simulator.device.curve import SAME_PLACE, Curve, LineSegment, between
+from dobot_async.simulator.device.profile import Profile, SpeedLimits, shared
+from dobot_async.simulator.device.work import Activity, DeviceFault, Vector
 
-__all__ = ["Leg", "Solver", "curve_leg", "joint_leg", "jump", "travel"]
+__all__ = ["JointSolver", "Leg", "curve_leg", "joint_leg", "jump", "travel"]
 
 REPEATED_POINTS, BAD_JUMP = 0x13, 0x15
 UNDERWAY = 0x10
@@ -31,7 +31,7 @@ MOST_LOOKS = 1000  # a way of more than 5 m is looked at more seldom, for planni
 HALVINGS = 40
 
 
-class Solver(Protocol):
+class JointSolver(Protocol):
     """The kinematics of one arm."""
 
     def forward(self, joints: Vector) -> Vector:
@@ -57,7 +57,7 @@ class Leg:
     joints: Callable[[float], Vector]
     profile: Profile
     stop: float = 1.0
-    fault: Fault | None = None
+    fault: DeviceFault | None = None
 
     @property
     def duration(self) -> float:
@@ -83,7 +83,7 @@ class Solved:
     """
 
     curve: Curve
-    solver: Solver
+    solver: JointSolver
     start: Vector
     count: int
 
@@ -91,12 +91,12 @@ class Solved:
         last_look = math.ceil(share * self.count - 1) / self.count
         for seen in (share, last_look):
             found = self.solve(seen) if seen > 0 else self.start
-            if not isinstance(found, Fault):
+            if not isinstance(found, DeviceFault):
                 return found
 
         return self.start
 
-    def leaves_reach(self, *, known_end: bool) -> tuple[float, Fault] | None:
+    def leaves_reach(self, *, known_end: bool) -> tuple[float, DeviceFault] | None:
         """Where the curve leaves the reach, and why; `known_end` says that its end is known to be within."""
         outside = self.fault_at(0.0)
         for look in range(1, self.count + (not known_end)):
@@ -108,7 +108,7 @@ class Solved:
 
         return None if known_end or not outside else (0.0, outside)
 
-    def edge(self, inside: float, outside: float, fault: Fault) -> tuple[float, Fault]:
+    def edge(self, inside: float, outside: float, fault: DeviceFault) -> tuple[float, DeviceFault]:
         """The last place within reach between two looks, and what is wrong beyond it."""
         for _ in range(HALVINGS):
             middle = (inside + outside) / 2
@@ -120,20 +120,22 @@ class Solved:
 
         return inside, fault
 
-    def solve(self, share: float) -> Vector | Fault:
+    def solve(self, share: float) -> Vector | DeviceFault:
         """What the solver says of the point there."""
         try:
             return self.solver.inverse(self.curve.point(share))
-        except Fault as fault:
+        except DeviceFault as fault:
             return fault
 
-    def fault_at(self, share: float) -> Fault | None:
+    def fault_at(self, share: float) -> DeviceFault | None:
         """What is wrong with the point there."""
         found = self.solve(share)
-        return found if isinstance(found, Fault) else None
+        return found if isinstance(found, DeviceFault) else None
 
 
-def joint_leg(start: Vector, end: Vector, pace: Pace, *, fault: Fault | None = None, leave: float = 0.0) -> Leg:
+def joint_leg(
+    start: Vector, end: Vector, pace: SpeedLimits, *, fault: DeviceFault | None = None, leave: float = 0.0
+) -> Leg:
     """Returns the way on which all joints set out and arrive together, the slowest at its pace.
 
     Args:
@@ -150,8 +152,8 @@ def joint_leg(start: Vector, end: Vector, pace: Pace, *, fault: Fault | None = N
 def curve_leg(
     curve: Curve,
     start: Vector,
-    solver: Solver,
-    pace: Pace,
+    solver: JointSolver,
+    pace: SpeedLimits,
     *,
     must_arrive: bool = True,
     every: float = EVERY,
@@ -187,18 +189,18 @@ def curve_leg(
     if left is None:
         return Leg(solved, profile)
 
-    return Leg(solved, profile, left[0], Fault(left[1].code + underway))
+    return Leg(solved, profile, left[0], DeviceFault(left[1].code + underway))
 
 
 def jump(
     start: Vector,
     target: Vector,
-    solver: Solver,
+    solver: JointSolver,
     *,
     height: float,
     ceiling: float,
-    vertical: Pace,
-    across: Pace,
+    vertical: SpeedLimits,
+    across: SpeedLimits,
     straight: bool = False,
     every: float = EVERY,
     underway: int = UNDERWAY,
@@ -225,18 +227,18 @@ def jump(
     """
     origin = solver.forward(start)
     if max(origin[2], target[2]) > ceiling + SAME_PLACE:
-        raise Fault(BAD_JUMP)
+        raise DeviceFault(BAD_JUMP)
 
     if straight and math.dist(origin[:3], target[:3]) < SAME_PLACE:
-        raise Fault(REPEATED_POINTS)
+        raise DeviceFault(REPEATED_POINTS)
 
     solver.inverse(target)
     top = min(max(origin[2], target[2]) + height, ceiling)
     above_origin = (*origin[:2], top, *origin[3:])
     above_target = (*target[:2], top, *target[3:])
 
-    def line(a: Vector, b: Vector, joints: Vector, pace: Pace) -> Leg:
-        return curve_leg(Line(a, b), joints, solver, pace, must_arrive=False, every=every, underway=underway)
+    def line(a: Vector, b: Vector, joints: Vector, pace: SpeedLimits) -> Leg:
+        return curve_leg(LineSegment(a, b), joints, solver, pace, must_arrive=False, every=every, underway=underway)
 
     def sideways(joints: Vector) -> Leg:
         if straight:
@@ -244,8 +246,8 @@ def jump(
 
         try:
             return joint_leg(joints, solver.inverse(above_target), across)
-        except Fault as fault:
-            return joint_leg(joints, joints, across, fault=Fault(fault.code + underway))
+        except DeviceFault as fault:
+            return joint_leg(joints, joints, across, fault=DeviceFault(fault.code + underway))
 
     legs = [line(origin, above_origin, start, vertical)]
 
@@ -279,7 +281,7 @@ def travel(legs: Sequence[Leg], end: Callable[[], None] = lambda: None) -> Activ
 
     def finish() -> None:
         if legs[-1].fault:
-            raise Fault(legs[-1].fault.code)
+            raise DeviceFault(legs[-1].fault.code)
 
         end()
 

@@ -16,20 +16,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-__all__ = ["Pace", "Profile", "shared", "trapezoid"]
+__all__ = ["Profile", "SpeedLimits", "shared", "trapezoid"]
 
 NEGLIGIBLE = 1e-9  # mm or degrees; a share of the way below this does not slow the others down
 
 
-class Pace(NamedTuple):
+class SpeedLimits(NamedTuple):
     """Highest velocity and acceleration, per s and s²: of each axis (degrees), or of length (mm) and turn (degrees)."""
 
     velocity: tuple[float, ...]
     acceleration: tuple[float, ...]
 
-    def scaled(self, velocity: float, acceleration: float) -> Pace:
+    def scaled(self, velocity: float, acceleration: float) -> SpeedLimits:
         """Returns these, each by a factor (1.0 changes nothing)."""
-        return Pace(
+        return SpeedLimits(
             tuple(value * velocity for value in self.velocity),
             tuple(value * acceleration for value in self.acceleration),
         )
@@ -122,7 +122,7 @@ def trapezoid(
     return Profile(length, enter, peak, leave, acceleration, rise, fall, rise + cruise + fall)
 
 
-def shared(spans: Sequence[float], pace: Pace, *, enter: float = 0.0, leave: float = 0.0) -> Profile:
+def shared(spans: Sequence[float], pace: SpeedLimits, *, enter: float = 0.0, leave: float = 0.0) -> Profile:
     """Returns the profile of a way of length 1 on which several axes set out and arrive together: the slowest leads.
 
     Args:

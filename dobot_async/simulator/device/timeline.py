@@ -13,9 +13,18 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dobot_async.simulator.device.work import INSTANT, Activity, DeviceOptions, Executed, Fault, Outcome, Vector, Work
+from dobot_async.simulator.device.work import (
+    INSTANT,
+    Activity,
+    DeviceFault,
+    DeviceOptions,
+    Executed,
+    Outcome,
+    Vector,
+    Work,
+)
 
-__all__ = ["Course"]
+__all__ = ["Timeline"]
 
 MOMENT = 0.005  # seconds to both sides over which a speed is taken
 
@@ -49,7 +58,7 @@ class Active:
         return self.origin + ahead[self.passed][0] if self.passed < len(ahead) else self.ends
 
 
-class Course:
+class Timeline:
     """What goes on in one arm.
 
     Args:
@@ -177,7 +186,7 @@ class Course:
         busy, self._busy = self._busy, True
         try:
             activity = self._begins(work) or INSTANT
-        except Fault as fault:
+        except DeviceFault as fault:
             self.alarms.add(fault.code)
             self.record(work, index, self.time, "alarm")
             return None
@@ -281,7 +290,7 @@ class Course:
         outcome: Outcome = "done"
         try:
             active.activity.end()
-        except Fault as fault:
+        except DeviceFault as fault:
             self.alarms.add(fault.code)
             outcome = "alarm"
 

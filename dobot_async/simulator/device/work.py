@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from dobot_async.simulator.device.device import Device
 
-__all__ = ["INSTANT", "NO_INDEX", "Activity", "DeviceOptions", "Executed", "Fault", "Outcome", "Vector", "Work"]
+__all__ = ["INSTANT", "NO_INDEX", "Activity", "DeviceFault", "DeviceOptions", "Executed", "Outcome", "Vector", "Work"]
 
 Vector = tuple[float, ...]
 Outcome = Literal["done", "alarm", "aborted"]
@@ -22,7 +22,7 @@ NO_INDEX = 2**64 - 1
 """What the firmware says where it has no index to tell."""
 
 
-class Fault(Exception):
+class DeviceFault(Exception):
     """What is done ends here with an alarm; raised by `Work.begin` and `Activity.end`."""
 
     def __init__(self, code: int) -> None:

@@ -23,10 +23,10 @@ from dobot_async.arms.magician.frame import WRITE, Frame, Parser, encode
 from dobot_async.arms.magician.kinematics import JointLimits
 from dobot_async.errors import ProtocolError
 from dobot_async.simulator.device.device import DeviceOptions, Work
-from dobot_async.simulator.magician.body import MAGICIAN, MagicianBody, Program
+from dobot_async.simulator.magician.body import MAGICIAN, MagicianBody, StoredProgram
 from dobot_async.simulator.magician.state import REACH
 
-__all__ = ["MAGICIAN", "Counters", "Program", "Quirks", "Session", "SimulatedMagician"]
+__all__ = ["MAGICIAN", "Counters", "MagicianSession", "Quirks", "SimulatedMagician", "StoredProgram"]
 
 UNKNOWN_COMMAND = 0x01
 NO_NUMBER = struct.pack("<f", math.nan)
@@ -114,9 +114,9 @@ class SimulatedMagician(MagicianBody):
         """Seconds since power-up by the arm's own clock, which goes right in an arm that is simulated faster too."""
         return self.device.uptime / self._lapse
 
-    def session(self) -> Session:
+    def session(self) -> MagicianSession:
         """Returns the arm's side of a connection to a new client."""
-        return Session(self)
+        return MagicianSession(self)
 
     def answer(self, frame: Frame) -> bytes:
         """Does what a request says; returns the bytes of the reply, or none."""
@@ -183,7 +183,7 @@ class SimulatedMagician(MagicianBody):
         return row.reply.encode(read(self, value) if read else self.state.get(c.BY_KEY[row.id, True]))
 
 
-class Session:
+class MagicianSession:
     """One client's connection: its half frames are its own."""
 
     def __init__(self, arm: SimulatedMagician) -> None:

@@ -13,11 +13,11 @@ from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import IGNORED, SIZE, Alarm, lookup
 from dobot_async.arms.magician.kinematics import JointLimits
-from dobot_async.simulator.device.device import Device, DeviceOptions, Executed, Fault, Work
-from dobot_async.simulator.magician.effects import Works, read_pin
+from dobot_async.simulator.device.device import Device, DeviceFault, DeviceOptions, Executed, Work
+from dobot_async.simulator.magician.effects import CommandEffects, read_pin
 from dobot_async.simulator.magician.state import HOME_JOINTS, Motor, State
 
-__all__ = ["MAGICIAN", "MagicianBody", "Program"]
+__all__ = ["MAGICIAN", "MagicianBody", "StoredProgram"]
 
 MAGICIAN = DeviceOptions(harmless=IGNORED, keep=20_000)
 """The options of a Magician; the record is bounded, for a simulation may run for months."""
@@ -28,7 +28,7 @@ LARGEST = 3.4e38
 
 
 @dataclass(slots=True)
-class Program:
+class StoredProgram:
     """The program in the arm's flash: how often it runs, and its commands with their parameters. Manual 2.19.4."""
 
     loops: int = 1
@@ -53,11 +53,11 @@ class MagicianBody:
     ) -> None:
         self.device = Device(clock, (*HOME_JOINTS, 0.0), options or MAGICIAN, self._finished)
         self.state = State(lambda: self.device.now, limits, homed=homed)
-        self.program: Program | None = None
+        self.program: StoredProgram | None = None
         self.color = c.Color(0, 0, 0)
         self.color_version = self.infrared_version = c.AccessoryVersion.V1
         self.infrared = dict.fromkeys(c.InfraredPort, False)
-        self._works = Works(self.state)
+        self._works = CommandEffects(self.state)
         self._downloading = False
         self._taught = False
         self._lines: Iterator[Work] = iter(())
@@ -260,7 +260,7 @@ class MagicianBody:
 
     def start_download(self, value: c.QueuedCmdStartDownload) -> None:
         """Stores what is queued from now on."""
-        self._downloading, self.program = True, Program(value.total_loop)
+        self._downloading, self.program = True, StoredProgram(value.total_loop)
 
     def stop_download(self) -> None:
         """Executes what is queued from now on."""
@@ -281,7 +281,7 @@ class MagicianBody:
         """Returns how many ms a motion from here would take; 0 if the arm cannot go there."""
         try:
             seconds = sum(leg.duration for leg in self._works.motions.ptp_legs(value, self.device.joints))
-        except Fault:
+        except DeviceFault:
             return 0
 
         return round(min(seconds * 1000, 2**32 - 1))

@@ -12,12 +12,12 @@ from typing import Any
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.magician import commands as c
-from dobot_async.simulator.device.device import Activity, Device, Executed, Fault, Work
+from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Executed, Work
 from dobot_async.simulator.magician.jog import jog, margins
 from dobot_async.simulator.magician.motion import Motions
 from dobot_async.simulator.magician.state import State
 
-__all__ = ["Works", "read_pin"]
+__all__ = ["CommandEffects", "read_pin"]
 
 LEVELLING = 5.0  # seconds
 LIMITS = frozenset(range(0x40, 0x4A))
@@ -26,7 +26,7 @@ INVALID = 0x6C
 AT_LIMIT = 0.1  # degrees; nearer to a limit than this, its alarm stays
 
 
-class Works:
+class CommandEffects:
     """Makes the works of one arm.
 
     Attributes:
@@ -94,7 +94,7 @@ class Works:
         """Until an input meets the condition."""
         compare = CONDITIONS.get((value.mode, value.condition))
         if compare is None:
-            raise Fault(INVALID)
+            raise DeviceFault(INVALID)
 
         state, mode, address = self._state, value.mode, value.address
         return Activity(None, ready=lambda: compare(read_pin(state, device, mode, address), value.threshold))
@@ -115,7 +115,7 @@ class Works:
             device.raise_alarm(code)
 
         if lost:
-            raise Fault(lost[0])
+            raise DeviceFault(lost[0])
 
     def run_motor(self, value: c.EMotor, _: Device) -> None:
         """Until told otherwise."""
@@ -145,7 +145,7 @@ INPUTS: Mapping[c.TriggerMode, frozenset[c.IOFunction]] = {
 }
 """The functions with which a pin can be read."""
 
-Plan = Callable[[Works, Any, Device], Activity | None]
+Plan = Callable[[CommandEffects, Any, Device], Activity | None]
 
 CONDITIONS: Mapping[tuple[c.TriggerMode, int], Callable[[float, float], bool]] = {
     (c.TriggerMode.IO, c.TriggerIOCondition.EQUAL): operator.eq,
@@ -158,13 +158,13 @@ CONDITIONS: Mapping[tuple[c.TriggerMode, int], Callable[[float, float], bool]] =
 
 PLANS: Mapping[Command[Any, Any], Plan] = {
     c.SET_HOME_CMD: lambda works, _, device: works.motions.home(device),
-    c.SET_AUTO_LEVELING_CMD: Works.level,
-    c.SET_JOG_CMD: Works.jog,
-    c.SET_WAIT_CMD: Works.wait,
-    c.SET_TRIG_CMD: Works.trigger,
-    c.SET_E_MOTOR: Works.run_motor,
-    c.SET_E_MOTOR_S: Works.turn_motor,
-    c.SET_LOST_STEP_CMD: Works.check_steps,
+    c.SET_AUTO_LEVELING_CMD: CommandEffects.level,
+    c.SET_JOG_CMD: CommandEffects.jog,
+    c.SET_WAIT_CMD: CommandEffects.wait,
+    c.SET_TRIG_CMD: CommandEffects.trigger,
+    c.SET_E_MOTOR: CommandEffects.run_motor,
+    c.SET_E_MOTOR_S: CommandEffects.turn_motor,
+    c.SET_LOST_STEP_CMD: CommandEffects.check_steps,
     c.SET_CP_CMD: lambda works, value, device: works.motions.cp(value, device),
     c.SET_CPLE_CMD: lambda works, value, device: works.motions.cp(value, device),
     c.SET_ARC_CMD: lambda works, value, device: works.motions.arc(value, device),

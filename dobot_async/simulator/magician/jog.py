@@ -11,10 +11,10 @@ from dataclasses import replace
 
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.kinematics import JointLimits
-from dobot_async.simulator.device.curve import Line
-from dobot_async.simulator.device.device import Activity, Fault, Vector
+from dobot_async.simulator.device.curve import LineSegment
+from dobot_async.simulator.device.device import Activity, DeviceFault, Vector
 from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg
-from dobot_async.simulator.device.profile import Pace, trapezoid
+from dobot_async.simulator.device.profile import SpeedLimits, trapezoid
 from dobot_async.simulator.magician.motion import RAIL, along, clipped, standing
 from dobot_async.simulator.magician.reach import Reach
 from dobot_async.simulator.magician.state import State
@@ -69,8 +69,8 @@ def joint_jog(state: State, axis: int, direction: int, factors: tuple[float, flo
     code = min(codes, key=left.__getitem__)
     target = (*joints[:axis], joints[axis] + direction * max(0.0, left[code]), *joints[axis + 1 :])
     limits = state.get(c.SET_JOG_JOINT_PARAMS)
-    pace = Pace(limits.velocity, limits.acceleration).scaled(*factors)
-    return joint_leg(joints, target, pace, fault=Fault(code), leave=math.inf)
+    pace = SpeedLimits(limits.velocity, limits.acceleration).scaled(*factors)
+    return joint_leg(joints, target, pace, fault=DeviceFault(code), leave=math.inf)
 
 
 def tool_jog(
@@ -80,13 +80,13 @@ def tool_jog(
     start = reach.forward(joints)
     end = (*start[:axis], start[axis] + direction * FAR, *start[axis + 1 :])
     limits = state.get(c.SET_JOG_COORDINATE_PARAMS)
-    pace = Pace(
+    pace = SpeedLimits(
         (limits.velocity[axis], limits.velocity[3]), (limits.acceleration[axis], limits.acceleration[3])
     ).scaled(*factors)
-    leg = curve_leg(Line(start, end), joints, reach, pace, must_arrive=False)
+    leg = curve_leg(LineSegment(start, end), joints, reach, pace, must_arrive=False)
     if leg.fault and leg.fault.code == LIMIT_UNDERWAY:
         left = margins(state.limits, leg.end)
-        return replace(leg, fault=Fault(min(left, key=left.__getitem__)))
+        return replace(leg, fault=DeviceFault(min(left, key=left.__getitem__)))
 
     return leg
 
@@ -97,6 +97,6 @@ def rail_jog(state: State, direction: int, factors: tuple[float, float], joints:
         return Activity()
 
     limits = state.get(c.SET_JOGL_PARAMS)
-    pace = Pace((limits.velocity,), (limits.acceleration,)).scaled(*factors)
+    pace = SpeedLimits((limits.velocity,), (limits.acceleration,)).scaled(*factors)
     rail = joint_leg((joints[4],), (RAIL[direction > 0],), pace, leave=math.inf)
     return along([Leg(lambda _: joints[:4], trapezoid(0.0, 0.0, 0.0))], rail)

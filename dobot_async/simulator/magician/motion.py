@@ -11,10 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from dobot_async.arms.magician import commands as c
-from dobot_async.simulator.device.curve import Line, arc, between, circle
-from dobot_async.simulator.device.device import Activity, Device, Fault, Vector
+from dobot_async.simulator.device.curve import LineSegment, arc, between, circle
+from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Vector
 from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg, jump, travel
-from dobot_async.simulator.device.profile import Pace, trapezoid
+from dobot_async.simulator.device.profile import SpeedLimits, trapezoid
 from dobot_async.simulator.magician.reach import Reach
 from dobot_async.simulator.magician.state import HOME_JOINTS, HOME_POINT, State
 
@@ -85,10 +85,10 @@ class Motions:
         velocity, acceleration = limits.junction_vel * clipped(ratios.velocity_ratio), limits.plan_acc
         passed_at, passed_with = self._passing
         leg = curve_leg(
-            Line(start, (*place, turn)),
+            LineSegment(start, (*place, turn)),
             joints[:4],
             reach,
-            Pace((velocity, NO_LIMIT), (acceleration * clipped(ratios.acceleration_ratio), NO_LIMIT)),
+            SpeedLimits((velocity, NO_LIMIT), (acceleration * clipped(ratios.acceleration_ratio), NO_LIMIT)),
             enter=passed_with if passed_at == device.now else 0.0,
             leave=velocity if goes_on(device) else 0.0,
         )
@@ -138,7 +138,7 @@ class Motions:
 
     def by_line(self, reach: Reach, start: Vector, target: Vector) -> list[Leg]:
         """The tool on a straight line."""
-        line = Line(reach.forward(start), reach.forward(target))
+        line = LineSegment(reach.forward(start), reach.forward(target))
         return [curve_leg(line, start, reach, self._tool_pace)]
 
     def by_jump(self, reach: Reach, start: Vector, target: Vector, *, straight: bool = False) -> list[Leg]:
@@ -158,25 +158,25 @@ class Motions:
         )
 
     @property
-    def _joint_pace(self) -> Pace:
+    def _joint_pace(self) -> SpeedLimits:
         limits, ratios = self._state.get(c.SET_PTP_JOINT_PARAMS), self._state.get(c.SET_PTP_COMMON_PARAMS)
-        return paced(Pace(limits.velocity, limits.acceleration), ratios)
+        return paced(SpeedLimits(limits.velocity, limits.acceleration), ratios)
 
     @property
-    def _tool_pace(self) -> Pace:
+    def _tool_pace(self) -> SpeedLimits:
         return tool_pace(self._state.get(c.SET_PTP_COORDINATE_PARAMS), self._state.get(c.SET_PTP_COMMON_PARAMS))
 
     @property
-    def _arc_pace(self) -> Pace:
+    def _arc_pace(self) -> SpeedLimits:
         return tool_pace(self._state.get(c.SET_ARC_PARAMS), self._state.get(c.SET_ARC_COMMON_PARAMS))
 
     def _rail_leg(self, start: float, end: float) -> Leg:
         """The rail's way; raises Fault if it is not that long."""
         if not RAIL[0] <= end <= RAIL[1]:
-            raise Fault(BEYOND_LIMIT)
+            raise DeviceFault(BEYOND_LIMIT)
 
         limits, ratios = self._state.get(c.SET_PTPL_PARAMS), self._state.get(c.SET_PTP_COMMON_PARAMS)
-        return joint_leg((start,), (end,), paced(Pace((limits.velocity,), (limits.acceleration,)), ratios))
+        return joint_leg((start,), (end,), paced(SpeedLimits((limits.velocity,), (limits.acceleration,)), ratios))
 
     def _time_at(self, legs: Sequence[Leg], percent: float) -> float:
         """After how many seconds the tool has gone so much of its way."""
@@ -229,18 +229,20 @@ def clipped(percent: float) -> float:
     return min(max(percent, 0.0), 100.0) / 100
 
 
-def paced(pace: Pace, ratios: c.PTPCommonParams | c.ARCCommonParams | c.JOGCommonParams) -> Pace:
+def paced(pace: SpeedLimits, ratios: c.PTPCommonParams | c.ARCCommonParams | c.JOGCommonParams) -> SpeedLimits:
     """A pace with its ratios."""
     return pace.scaled(clipped(ratios.velocity_ratio), clipped(ratios.acceleration_ratio))
 
 
-def tool_pace(limits: c.PTPCoordinateParams | c.ARCParams, ratios: c.PTPCommonParams | c.ARCCommonParams) -> Pace:
+def tool_pace(
+    limits: c.PTPCoordinateParams | c.ARCParams, ratios: c.PTPCommonParams | c.ARCCommonParams
+) -> SpeedLimits:
     """The pace of length and turn."""
     velocities, accelerations = (
         (limits.xyz_velocity, limits.r_velocity),
         (limits.xyz_acceleration, limits.r_acceleration),
     )
-    return paced(Pace(velocities, accelerations), ratios)
+    return paced(SpeedLimits(velocities, accelerations), ratios)
 
 
 def point_of(point: c.ARCPoint) -> Vector:

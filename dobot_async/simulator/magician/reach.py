@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dobot_async.arms.magician.kinematics import Kinematics, Unreachable
-from dobot_async.simulator.device.device import Fault, Vector
+from dobot_async.simulator.device.device import DeviceFault, Vector
 
 __all__ = ["Reach"]
 
@@ -25,20 +25,20 @@ class Reach:
         try:
             return self.kinematics.check(*point)
         except Unreachable as error:
-            raise Fault(error.alarm) from None
+            raise DeviceFault(error.alarm) from None
 
     def base_angle(self, x: float, y: float, z: float) -> float:
         """Returns joint 1 of a place, whatever the limits; raises Fault."""
         try:
             return self.kinematics.inverse(x, y, z, 0.0).j1
         except Unreachable as error:
-            raise Fault(error.alarm) from None
+            raise DeviceFault(error.alarm) from None
 
     def check(self, joints: Vector) -> Vector:
         """Returns these joints; raises Fault if they are beyond the limits."""
         try:
             self.kinematics.check_joints(*joints)
         except Unreachable as error:
-            raise Fault(error.alarm) from None
+            raise DeviceFault(error.alarm) from None
 
         return joints

@@ -12,12 +12,12 @@ from typing import Any
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.mycobot import commands as c
 from dobot_async.arms.mycobot.models import SENTINEL, CobotModel
-from dobot_async.simulator.device.device import Device, DeviceOptions, Executed, Fault, Work
+from dobot_async.simulator.device.device import Device, DeviceFault, DeviceOptions, Executed, Work
 from dobot_async.simulator.device.path import Leg, travel
 from dobot_async.simulator.device.work import Vector
 from dobot_async.simulator.mycobot.elbow import elbow_angle
-from dobot_async.simulator.mycobot.gripper import Gripper
-from dobot_async.simulator.mycobot.kinematics import Chain, Frame, Palletizer
+from dobot_async.simulator.mycobot.gripper import SimulatedGripper
+from dobot_async.simulator.mycobot.kinematics import Chain, Palletizer, Transform
 from dobot_async.simulator.mycobot.plans import CENTRE, PLANS, STEPS
 from dobot_async.simulator.mycobot.segments import Ways
 
@@ -61,7 +61,7 @@ class MyCobotBody:
         self.model = model
         self.device = Device(clock, (0.0,) * model.joints, options or MYCOBOT)
         self.ways: Ways = Ways(model, play)
-        self.gripper = Gripper(lambda: self.device.now, plugged_in=gripper)
+        self.gripper = SimulatedGripper(lambda: self.device.now, plugged_in=gripper)
         self.powered = True
         self.released: set[int] = set()
         self.errors: dict[int, int] = {}
@@ -109,16 +109,16 @@ class MyCobotBody:
         return self.world.then(self.ways.frame(joints)).then(self.tool).point
 
     @property
-    def tool(self) -> Frame:
+    def tool(self) -> Transform:
         """What coordinates are of, seen from the flange."""
         used = self.settings[c.SET_END_TYPE] is c.EndType.TOOL
-        return Frame.of(self.settings[c.SET_TOOL_REFERENCE] if used else (0.0,) * 6)
+        return Transform.of(self.settings[c.SET_TOOL_REFERENCE] if used else (0.0,) * 6)
 
     @property
-    def world(self) -> Frame:
+    def world(self) -> Transform:
         """The base, seen from where coordinates count from."""
         used = self.settings[c.SET_REFERENCE_FRAME] is c.ReferenceFrame.WORLD
-        return Frame.of(self.settings[c.SET_WORLD_REFERENCE] if used else (0.0,) * 6)
+        return Transform.of(self.settings[c.SET_WORLD_REFERENCE] if used else (0.0,) * 6)
 
     @property
     def moving(self) -> bool:
@@ -266,7 +266,7 @@ class MyCobotBody:
         """The way of a motion, from where the arm is now."""
         try:
             return PLANS[row](self, value)
-        except Fault as fault:
+        except DeviceFault as fault:
             self.error = fault.code
             raise
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["Gripper"]
+__all__ = ["SimulatedGripper"]
 
 SPEED = 100.0  # percent of its way per s
 ABSENT = 255
 
 
-class Gripper:
+class SimulatedGripper:
     """A gripper at an arm, or the lack of one.
 
     Attributes:

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 
 from dobot_async.arms.mycobot.standstill import matrix
 
-__all__ = ["KINEMATICS", "Chain", "Frame", "Palletizer", "Solver"]
+__all__ = ["KINEMATICS", "Chain", "InverseSolver", "Palletizer", "Transform"]
 
 Vector = tuple[float, ...]
 Ranges = Sequence[tuple[float, float]]
@@ -27,14 +27,14 @@ ASIDE = (0.0, 60.0, -60.0)
 SMALL = 1e-9
 
 
-class Frame(NamedTuple):
+class Transform(NamedTuple):
     """A place and a rotation."""
 
     place: Sequence[float]
     rotation: Matrix
 
     @classmethod
-    def of(cls, point: Sequence[float]) -> Frame:
+    def of(cls, point: Sequence[float]) -> Transform:
         """That of a point; what is missing of its angles is 0."""
         angles = [*point[3:], 0.0, 0.0, 0.0][:3]
         return cls(tuple(point[:3]), matrix(angles))
@@ -51,21 +51,21 @@ class Frame(NamedTuple):
 
         return (*self.place, *map(math.degrees, (rx, ry, rz)))
 
-    def then(self, other: Frame) -> Frame:
+    def then(self, other: Transform) -> Transform:
         """The other one, seen from where this one is seen from."""
         place = [p + sum(r * q for r, q in zip(row, other.place, strict=True)) for p, row in self.rows]
         columns = list(zip(*other.rotation, strict=True))
         rotation = [
             [sum(a * b for a, b in zip(row, column, strict=True)) for column in columns] for row in self.rotation
         ]
-        return Frame(place, rotation)
+        return Transform(place, rotation)
 
     @property
-    def inverse(self) -> Frame:
+    def inverse(self) -> Transform:
         """Where this one is seen from, seen from it."""
         rotation = [list(column) for column in zip(*self.rotation, strict=True)]
         place = [-sum(r * p for r, p in zip(row, self.place, strict=True)) for row in rotation]
-        return Frame(place, rotation)
+        return Transform(place, rotation)
 
     @property
     def rows(self) -> zip[tuple[float, Sequence[float]]]:
@@ -73,7 +73,7 @@ class Frame(NamedTuple):
         return zip(self.place, self.rotation, strict=True)
 
 
-class Solver(Protocol):
+class InverseSolver(Protocol):
     """The kinematics of one model."""
 
     def forward(self, joints: Sequence[float]) -> Vector:
@@ -93,7 +93,7 @@ class Solver(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class LinkParameters:
     """One joint and what it carries, after Denavit and Hartenberg: mm and degrees."""
 
     d: float
@@ -101,16 +101,16 @@ class Link:
     alpha: float
     offset: float = 0.0
 
-    def frame(self, angle: float) -> Frame:
+    def frame(self, angle: float) -> Transform:
         """The next joint, seen from this one."""
         (s, c), (sa, ca) = ((math.sin(x), math.cos(x)) for x in map(math.radians, (angle + self.offset, self.alpha)))
-        return Frame((self.a * c, self.a * s, self.d), [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0.0, sa, ca]])
+        return Transform((self.a * c, self.a * s, self.d), [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0.0, sa, ca]])
 
 
 class Chain:
     """Joints, each on the one before."""
 
-    def __init__(self, *links: Link) -> None:
+    def __init__(self, *links: LinkParameters) -> None:
         self.links = links
         self.length = sum(math.hypot(link.a, link.d) for link in links)
 
@@ -127,7 +127,7 @@ class Chain:
         seeds: bool = True,
     ) -> Vector | None:
         """Returns joints that reach a point: the nearest by damped least squares, from here or from other places."""
-        goal = Frame.of(point)
+        goal = Transform.of(point)
         if math.hypot(*goal.place) > self.length:
             return None
 
@@ -147,7 +147,7 @@ class Chain:
 
         return None
 
-    def solve(self, goal: Frame, start: Sequence[float], limits: Ranges) -> Vector | None:
+    def solve(self, goal: Transform, start: Sequence[float], limits: Ranges) -> Vector | None:
         """Steps towards the goal from one start."""
         joints = [min(max(joint, low), high) for joint, (low, high) in zip(start, limits, strict=True)]
         for _ in range(ROUNDS):
@@ -172,9 +172,9 @@ class Chain:
 
         return None
 
-    def frames(self, joints: Sequence[float]) -> list[Frame]:
+    def frames(self, joints: Sequence[float]) -> list[Transform]:
         """The axis of each joint, and the flange at the end."""
-        frames = [Frame((0.0, 0.0, 0.0), matrix((0.0, 0.0, 0.0)))]
+        frames = [Transform((0.0, 0.0, 0.0), matrix((0.0, 0.0, 0.0)))]
         for link, joint in zip(self.links, joints, strict=True):
             frames.append(frames[-1].then(link.frame(joint)))
 
@@ -221,7 +221,7 @@ class Palletizer:
         return joints if within else None
 
 
-def gap(here: Frame, there: Frame) -> list[float]:
+def gap(here: Transform, there: Transform) -> list[float]:
     """What is missing from one frame to another: mm, and radians as mm at the end of a lever."""
     a, b = here.rotation, there.rotation
     turn = [[sum(b[i][k] * a[j][k] for k in range(3)) for j in range(3)] for i in range(3)]
@@ -236,7 +236,7 @@ def gap(here: Frame, there: Frame) -> list[float]:
     return [*(b - a for a, b in zip(here.place, there.place, strict=True)), *(factor * each for each in axis)]
 
 
-def column(joint: Frame, end: Frame) -> list[float]:
+def column(joint: Transform, end: Transform) -> list[float]:
     """How the end moves with a joint: mm per radian, and its rotation at the end of a lever."""
     axis = [row[2] for row in joint.rotation]
     arm = [b - a for a, b in zip(joint.place, end.place, strict=True)]
@@ -267,36 +267,36 @@ def solved(rows: Sequence[Sequence[float]], right: Sequence[float]) -> list[floa
 def like_280(base: float, upper: float, fore: float, wrist: tuple[float, float, float]) -> Chain:
     """Six joints as those of a myCobot 280, in other lengths."""
     return Chain(
-        Link(base, 0, 90),
-        Link(0, -upper, 0, -90),
-        Link(0, -fore, 0),
-        Link(wrist[0], 0, 90, -90),
-        Link(wrist[1], 0, -90, 90),
-        Link(wrist[2], 0, 0),
+        LinkParameters(base, 0, 90),
+        LinkParameters(0, -upper, 0, -90),
+        LinkParameters(0, -fore, 0),
+        LinkParameters(wrist[0], 0, 90, -90),
+        LinkParameters(wrist[1], 0, -90, 90),
+        LinkParameters(wrist[2], 0, 0),
     )
 
 
 MYCOBOT_280 = like_280(131.22, 110.4, 96, (63.4, 75.05, 45.6))
-KINEMATICS: Mapping[str, Solver] = {
+KINEMATICS: Mapping[str, InverseSolver] = {
     "mycobot280": MYCOBOT_280,
     "mycobot280pi": MYCOBOT_280,
     "mycobot320": like_280(173.9, 135, 120, (88.78, 95, 65.5)),
     "mecharm270": Chain(
-        Link(114, 0, -90),
-        Link(0, 100, 0, -90),
-        Link(0, 10, -90),
-        Link(96, 0, 90),
-        Link(0, 0, -90),
-        Link(56.5, 0, 0),
+        LinkParameters(114, 0, -90),
+        LinkParameters(0, 100, 0, -90),
+        LinkParameters(0, 10, -90),
+        LinkParameters(96, 0, 90),
+        LinkParameters(0, 0, -90),
+        LinkParameters(56.5, 0, 0),
     ),
     "myarm300": Chain(
-        Link(170, 0, -90),
-        Link(0, 0, 90),
-        Link(125, 0, -90),
-        Link(0, 0, 90),
-        Link(125, 0, -90),
-        Link(0, 0, 90),
-        Link(60, 0, 0),
+        LinkParameters(170, 0, -90),
+        LinkParameters(0, 0, 90),
+        LinkParameters(125, 0, -90),
+        LinkParameters(0, 0, 90),
+        LinkParameters(125, 0, -90),
+        LinkParameters(0, 0, 90),
+        LinkParameters(60, 0, 0),
     ),
     "mypalletizer260": Palletizer(123, 130, 130, 0),
 }

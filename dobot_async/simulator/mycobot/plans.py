@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.mycobot import commands as c
 from dobot_async.simulator.device.path import Leg
-from dobot_async.simulator.device.profile import Pace
-from dobot_async.simulator.mycobot.kinematics import Frame, Palletizer
+from dobot_async.simulator.device.profile import SpeedLimits
+from dobot_async.simulator.mycobot.kinematics import Palletizer, Transform
 
 if TYPE_CHECKING:
     from dobot_async.simulator.mycobot.body import MyCobotBody
@@ -32,7 +32,7 @@ def to_point(arm: MyCobotBody, coords: Mapping[int, float], speed: float, mode: 
     """Some coordinates, by their places, to values."""
     target: Sequence[float] = [coords.get(place, here) for place, here in enumerate(arm.coords)]
     if not isinstance(arm.ways.solver, Palletizer):
-        target = arm.world.inverse.then(Frame.of(target)).then(arm.tool.inverse).point
+        target = arm.world.inverse.then(Transform.of(target)).then(arm.tool.inverse).point
 
     way = arm.settings[c.SET_MOVEMENT_TYPE] if mode is None else mode
     straight = way is c.MoveMode.LINEAR and not arm.settings[c.SET_FRESH_MODE]
@@ -46,7 +46,7 @@ def drag(arm: MyCobotBody, value: c.SetEncodersDrag) -> Leg:
         min(speed / STEPS, most) if speed else most for speed, most in zip(value.speeds, fastest.velocity, strict=True)
     )
     target = [angle for _, angle in sorted(of_encoders(value.encoders).items())]
-    return arm.ways.to_joints(arm.joints, target, 100, Pace(speeds, fastest.acceleration))
+    return arm.ways.to_joints(arm.joints, target, 100, SpeedLimits(speeds, fastest.acceleration))
 
 
 def of_encoders(encoders: Sequence[int]) -> dict[int, float]:

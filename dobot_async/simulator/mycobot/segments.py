@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from dobot_async.arms.mycobot.models import CobotModel
 from dobot_async.simulator.device.curve import between
 from dobot_async.simulator.device.path import Leg, joint_leg
-from dobot_async.simulator.device.profile import Pace, shared
-from dobot_async.simulator.device.work import Fault, Vector
+from dobot_async.simulator.device.profile import SpeedLimits, shared
+from dobot_async.simulator.device.work import DeviceFault, Vector
 from dobot_async.simulator.mycobot.elbow import turn_elbow
-from dobot_async.simulator.mycobot.kinematics import KINEMATICS, Chain, Frame
+from dobot_async.simulator.mycobot.kinematics import KINEMATICS, Chain, Transform
 
 __all__ = ["NO_INVERSE", "NO_LINE", "Ways"]
 
@@ -44,11 +44,11 @@ class Ways:
         self.limits = list(model.joint_limits)
         self.solver = KINEMATICS[model.name]
 
-    def to_joints(self, start: Vector, target: Sequence[float], speed: float, pace: Pace | None = None) -> Leg:
+    def to_joints(self, start: Vector, target: Sequence[float], speed: float, pace: SpeedLimits | None = None) -> Leg:
         """All joints set out and arrive together; the slowest at its pace, by default as the percentage says."""
         for joint, (angle, (low, high)) in enumerate(zip(target, self.limits, strict=True), 1):
             if not low - LIMIT_SLACK <= angle <= high + LIMIT_SLACK:
-                raise Fault(joint)
+                raise DeviceFault(joint)
 
         end = tuple(angle + off for angle, off in zip(target, self.play, strict=True))
         return joint_leg(start, end, pace or self.pace(speed))
@@ -57,14 +57,14 @@ class Ways:
         """The flange to a point, by the joints or along a straight line."""
         found = self.solver.inverse(point, start, self.limits)
         if found is None:
-            raise Fault(NO_INVERSE)
+            raise DeviceFault(NO_INVERSE)
 
         if not straight:
             return self.to_joints(start, found, speed)
 
         leg = self.line(start, point, speed)
         if leg.stop < 1.0:
-            raise Fault(NO_LINE)
+            raise DeviceFault(NO_LINE)
 
         return leg
 
@@ -72,7 +72,7 @@ class Ways:
         """The elbow of seven joints to an angle, with the flange where it is at the end."""
         found = turn_elbow(self.solver, start, angle, self.limits) if isinstance(self.solver, Chain) else None
         if found is None:
-            raise Fault(NO_INVERSE)
+            raise DeviceFault(NO_INVERSE)
 
         return self.to_joints(start, found, speed)
 
@@ -119,14 +119,14 @@ class Ways:
             return tuple(angle + share * off for angle, off in zip(exact, self.play, strict=True))
 
         factor = speed / 100
-        pace = Pace((TOOL_SPEED * factor, self.model.joint_speed * factor), (TOOL_ACCELERATION, ACCELERATION))
+        pace = SpeedLimits((TOOL_SPEED * factor, self.model.joint_speed * factor), (TOOL_ACCELERATION, ACCELERATION))
         return Leg(joints, shared((length, turn), pace), (len(ways) - 1) / count)
 
-    def pace(self, speed: float) -> Pace:
+    def pace(self, speed: float) -> SpeedLimits:
         """What the joints may do at a percentage."""
         count = self.model.joints
-        return Pace((self.model.joint_speed * speed / 100,) * count, (ACCELERATION,) * count)
+        return SpeedLimits((self.model.joint_speed * speed / 100,) * count, (ACCELERATION,) * count)
 
-    def frame(self, joints: Sequence[float]) -> Frame:
+    def frame(self, joints: Sequence[float]) -> Transform:
         """Where the flange is."""
-        return Frame.of(self.solver.forward(joints))
+        return Transform.of(self.solver.forward(joints))

@@ -21,7 +21,7 @@ from typing import Any
 
 from dobot_async.arms.registry import Parts
 from dobot_async.simulator.scene.geometry import Place3, Placement
-from dobot_async.simulator.scene.seat import Event, SceneArm, Seat
+from dobot_async.simulator.scene.seat import Event, SceneArm, ScenePlace
 from dobot_async.simulator.scene.stock import ABOVE_ALL, RunningBelt, Stock, Workpiece
 from dobot_async.simulator.scene.things import SEEN, Belt, Block, ColorSpot, LightBeam, Mount, Piece
 
@@ -69,7 +69,7 @@ class Scene:
 
         self._stock = Stock(table, blocks, belts)
         self._sensors = tuple(sensors)
-        self._seats: list[Seat] = []
+        self._seats: list[ScenePlace] = []
         self._events: deque[Event] = deque(maxlen=EVENTS)
         self._strokes: list[list[Place3]] = []
         self._clock: Callable[[], float] = lambda: self._time
@@ -195,7 +195,7 @@ class Scene:
         for belt in self._belts_of(mount):
             shown.pulses(belt.belt.motor)
 
-        seat = Seat(shown, mount, self._stock, self._events.append)
+        seat = ScenePlace(shown, mount, self._stock, self._events.append)
         self._tell(seat)
         for belt in self._belts_of(mount):
             belt.plug(partial(shown.pulses, belt.belt.motor))
@@ -275,7 +275,7 @@ class Scene:
         for seat in self._seats:
             self._tell(seat)
 
-    def _tell(self, seat: Seat) -> None:
+    def _tell(self, seat: ScenePlace) -> None:
         """Tells an arm what its sensors see."""
         for sensor in self._sensors:
             if sensor.arm == seat.mount.name:
@@ -304,7 +304,7 @@ class Scene:
     def _belts_of(self, mount: Mount) -> list[RunningBelt]:
         return [belt for belt in self._stock.belts if belt.belt.arm == mount.name]
 
-    def _detach(self, seat: Seat) -> None:
+    def _detach(self, seat: ScenePlace) -> None:
         """Takes an arm out; what it holds stays where it is."""
         with self.still():
             seat.leave()

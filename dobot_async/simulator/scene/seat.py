@@ -15,7 +15,7 @@ from dobot_async.simulator.scene.geometry import Place3, Placement
 from dobot_async.simulator.scene.stock import RunningBelt, Standing, Stock, Workpiece
 from dobot_async.simulator.scene.things import ColorSpot, CupTool, GripperTool, LightBeam, Mount, PenTool, Tool
 
-__all__ = ["Event", "SceneArm", "Seat"]
+__all__ = ["Event", "SceneArm", "ScenePlace"]
 
 FINGERS = 0.5  # mm by which a gripper has to be wider than a piece to let it go
 
@@ -104,7 +104,7 @@ class SceneArm(Protocol):
         """Tells it what a colour sensor sees; raises ValueError if it cannot have one."""
 
 
-class Seat:
+class ScenePlace:
     """An arm in a scene; as a carrier it is the tip of the arm's tool.
 
     Attributes:
@@ -243,7 +243,7 @@ class Seat:
 
     def _takes(self, piece: Workpiece, tip: Placement, before: float) -> bool:
         """Whether the tool takes a piece now; `before` is how wide it was."""
-        if self._grip > width(piece) or isinstance(piece.carrier, Seat):
+        if self._grip > width(piece) or isinstance(piece.carrier, ScenePlace):
             return False
 
         solid, give = piece.solid, self.mount.tool.give

@@ -18,7 +18,7 @@ from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.frame import split_words
 from dobot_async.errors import ProtocolError
 from dobot_async.simulator.device.device import Device, DeviceOptions, Executed
-from dobot_async.simulator.ultraarm.body import Registers, Works, plus, pose
+from dobot_async.simulator.ultraarm.body import CommandEffects, Registers, plus, pose
 from dobot_async.simulator.ultraarm.kinematics import forward
 
 __all__ = ["ULTRAARM", "SimulatedUltraArm", "UltraArmCounters", "UltraArmQuirks", "UltraArmSession"]
@@ -104,7 +104,7 @@ class SimulatedUltraArm:
         self.device = Device(clock, (0.0, 0.0, 0.0, 0.0), options or ULTRAARM)
         self.quirks = quirks
         self.counters = UltraArmCounters()
-        self._works = Works(self._registers)
+        self._works = CommandEffects(self._registers)
 
     @property
     def registers(self) -> Registers:

@@ -9,13 +9,13 @@ from typing import Any
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.ultraarm import commands as c
-from dobot_async.simulator.device.curve import Line, between
-from dobot_async.simulator.device.device import Activity, Device, Fault, Vector, Work
+from dobot_async.simulator.device.curve import LineSegment, between
+from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Vector, Work
 from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg, travel
-from dobot_async.simulator.device.profile import Pace, trapezoid
+from dobot_async.simulator.device.profile import SpeedLimits, trapezoid
 from dobot_async.simulator.ultraarm.kinematics import REACH, checked, forward, inverse
 
-__all__ = ["Registers", "Works"]
+__all__ = ["CommandEffects", "Registers"]
 
 ACCELERATION = 400.0  # mm/s² and degrees/s²
 DEFAULT_SPEED = 50.0
@@ -95,7 +95,7 @@ Move = Callable[[Registers, Vector, Any], Activity]
 """How a motion is planned, from where the joints are."""
 
 
-class Works:
+class CommandEffects:
     """Makes of each command the work that it is."""
 
     def __init__(self, registers: Registers) -> None:
@@ -125,7 +125,7 @@ class Works:
 
         try:
             return move(self.registers, device.joints, value)
-        except Fault:
+        except DeviceFault:
             self.missed += 1
             return None
 
@@ -176,8 +176,8 @@ def move_coords(registers: Registers, joints: Vector, value: c.CoordsMove) -> Ac
         target = tuple(old if each is None else each for each, old in zip(given, here, strict=True))
 
     own = plus(target, tuple(-each for each in registers.origin))
-    pace = Pace((registers.speed,) * 2, (registers.acceleration,) * 2)
-    leg = curve_leg(Line(forward(joints), own), joints, Geometry(), pace)
+    pace = SpeedLimits((registers.speed,) * 2, (registers.acceleration,) * 2)
+    leg = curve_leg(LineSegment(forward(joints), own), joints, Geometry(), pace)
     if leg.fault:
         raise leg.fault
 
@@ -200,7 +200,7 @@ def move_joint(registers: Registers, joints: Vector, value: c.JointMove) -> Acti
 def turn(registers: Registers, joints: Vector, end: Vector) -> Activity:
     """The joints to angles."""
     checked(end)
-    return travel([joint_leg(joints, end, Pace((registers.speed,) * 4, (registers.acceleration,) * 4))])
+    return travel([joint_leg(joints, end, SpeedLimits((registers.speed,) * 4, (registers.acceleration,) * 4))])
 
 
 def home(registers: Registers, joints: Vector, _: None) -> Activity:
@@ -210,7 +210,7 @@ def home(registers: Registers, joints: Vector, _: None) -> Activity:
         registers.homed = True
         registers.origin = (0.0,) * 4
 
-    way = joint_leg(joints, (0.0,) * 4, Pace((60.0,) * 4, (ACCELERATION,) * 4))
+    way = joint_leg(joints, (0.0,) * 4, SpeedLimits((60.0,) * 4, (ACCELERATION,) * 4))
     switches = Leg(lambda _: (0.0,) * 4, trapezoid(1.0, 1 / HOMING, math.inf))
     return travel([way, switches], arrived)
 
@@ -221,7 +221,7 @@ def joint_jog(registers: Registers, joints: Vector, value: c.JogMove) -> Activit
     place = value.axis - 1
     limit = (REACH.j1, REACH.j2, REACH.j3)[place][value.direction == c.JogDirection.POSITIVE]
     end = (*joints[:place], limit, *joints[place + 1 :])
-    return travel([joint_leg(joints, end, Pace((speed,) * 4, (ACCELERATION,) * 4))])
+    return travel([joint_leg(joints, end, SpeedLimits((speed,) * 4, (ACCELERATION,) * 4))])
 
 
 def tool_jog(registers: Registers, joints: Vector, value: c.JogMove) -> Activity:
@@ -234,12 +234,12 @@ def tool_jog(registers: Registers, joints: Vector, value: c.JogMove) -> Activity
     for step in range(1, int(FAR)):
         try:
             ways.append(inverse((*start[:place], start[place] + sign * step, *start[place + 1 :])))
-        except Fault:
+        except DeviceFault:
             break
 
     last = len(ways) - 1
     if not last:
-        return travel([joint_leg(joints, joints, Pace((speed,) * 4, (ACCELERATION,) * 4))])
+        return travel([joint_leg(joints, joints, SpeedLimits((speed,) * 4, (ACCELERATION,) * 4))])
 
     def at(share: float) -> Vector:
         place = min(int(share * last), last - 1)

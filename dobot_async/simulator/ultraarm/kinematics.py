@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from dobot_async.arms.ultraarm import commands as c
-from dobot_async.simulator.device.device import Fault, Vector
+from dobot_async.simulator.device.device import DeviceFault, Vector
 
 __all__ = ["LIMIT", "OUT_OF_REACH", "REACH", "checked", "forward", "inverse"]
 
@@ -32,7 +32,7 @@ def inverse(point: Vector) -> Vector:
     ahead = math.hypot(x, y) - OFFSET
     distance = math.hypot(ahead, z)
     if not abs(UPPER - FORE) < distance <= UPPER + FORE:
-        raise Fault(OUT_OF_REACH)
+        raise DeviceFault(OUT_OF_REACH)
 
     opening = (UPPER**2 + distance**2 - FORE**2) / (2 * UPPER * distance)
     upper = math.atan2(z, ahead) + math.acos(max(-1.0, min(1.0, opening)))
@@ -44,6 +44,6 @@ def checked(joints: Vector) -> Vector:
     """Returns the joints; raises Fault beyond a limit."""
     for value, (low, high) in zip(joints, (REACH.j1, REACH.j2, REACH.j3, REACH.j4), strict=True):
         if not low - 1e-6 <= value <= high + 1e-6:
-            raise Fault(LIMIT)
+            raise DeviceFault(LIMIT)
 
     return joints

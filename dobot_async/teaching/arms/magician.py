@@ -12,7 +12,7 @@ from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.arm import Magician
 from dobot_async.arms.magician.kinematics import Kinematics
 from dobot_async.handling.arms import settle_time
-from dobot_async.teaching.base import Limits, TaughtArm, clip
+from dobot_async.teaching.base import RecordingLimits, TaughtArm, clip
 from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
 
 __all__ = ["MagicianLimits", "TaughtMagician"]
@@ -22,7 +22,7 @@ SAME = 0.01  # mm by which two tools may differ
 MODES = {"point": c.PTPMode.MOVJ_XYZ, "line": c.PTPMode.MOVL_XYZ, "jump": c.PTPMode.JUMP_XYZ}
 
 
-class MagicianLimits(Limits):
+class MagicianLimits(RecordingLimits):
     """The joints and their limits, with the tool that is on the arm."""
 
     family = "magician"

@@ -9,7 +9,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
 from dobot_async.arms.mycobot.params import MoveMode
-from dobot_async.teaching.base import Limits, TaughtArm, clip
+from dobot_async.teaching.base import RecordingLimits, TaughtArm, clip
 from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
 
 __all__ = ["CobotLimits", "TaughtCobot"]
@@ -18,7 +18,7 @@ USUAL = 50
 """Percent of its speed, as its verbs have it."""
 
 
-class CobotLimits(Limits):
+class CobotLimits(RecordingLimits):
     """A model's joints, and its ranges of coordinates."""
 
     family = "mycobot"

@@ -10,7 +10,7 @@ from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.arms.ultraarm.verbs import SPEED
 from dobot_async.errors import CommandRejected
-from dobot_async.teaching.base import Limits, TaughtArm, clip
+from dobot_async.teaching.base import RecordingLimits, TaughtArm, clip
 from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
 
 __all__ = ["TaughtUltraArm", "UltraArmLimits"]
@@ -18,7 +18,7 @@ __all__ = ["TaughtUltraArm", "UltraArmLimits"]
 SLOWEST, FASTEST = 1.0, 200.0  # F of the manual
 
 
-class UltraArmLimits(Limits):
+class UltraArmLimits(RecordingLimits):
     """The ranges of joints and coordinates."""
 
     family = "ultraarm"

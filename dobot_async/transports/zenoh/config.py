@@ -19,7 +19,7 @@ from dobot_async.transports.options import Option, options, words
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["NAME", "Place", "address", "library", "reason"]
+__all__ = ["NAME", "ZenohConfig", "address", "library", "reason"]
 
 GONE = {
     "transport/unicast/open_timeout": (10_000, 3000),  # milliseconds
@@ -57,7 +57,7 @@ def reason(error: Exception) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ZenohConfig:
     """An arm's name on Zenoh, and how the network of Zenoh is reached.
 
     Attributes:
@@ -76,7 +76,7 @@ class Place:
     lan: bool = False
 
     @classmethod
-    def of(cls, url: SplitResult, *, serving: bool) -> Place:
+    def of(cls, url: SplitResult, *, serving: bool) -> ZenohConfig:
         """Reads `zenoh://name?config=FILE&connect=tcp/host:port`, for a server also `&listen=` or `&lan=yes`.
 
         Raises:

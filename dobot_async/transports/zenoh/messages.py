@@ -19,7 +19,7 @@ from queue import SimpleQueue
 
 from dobot_async.transports.zenoh.config import library, reason
 
-__all__ = ["DATA", "END", "HEADER", "VERSION", "Lost", "Numbered", "Outbox"]
+__all__ = ["DATA", "END", "HEADER", "VERSION", "Lost", "Numbered", "SendQueue"]
 
 VERSION = 1
 DATA, END = 0, 1
@@ -69,7 +69,7 @@ class Numbered:
         return kind, message[HEADER.size :]
 
 
-class Outbox:
+class SendQueue:
     """The way of one peer's messages out to Zenoh: in order, and nothing is lost before the end.
 
     What gathers while a message is on its way goes as the next one, so that a burst is a few messages. Each peer has a

@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from dobot_async._core.util.tasks import run_shielded, run_within
 from dobot_async.errors import ConnectFailed
-from dobot_async.transports.zenoh.config import Place, library, reason
+from dobot_async.transports.zenoh.config import ZenohConfig, library, reason
 
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["VERSION", "Crossing", "Keys", "Session"]
+__all__ = ["VERSION", "Crossing", "KeyExpressions", "ZenohSession"]
 
 T = TypeVar("T")
 ROOT = "dobot"
@@ -37,7 +37,7 @@ MOST = 65_536
 """Bytes that may be on their way from Zenoh's threads to the event loop; a peer that sends more is a flood."""
 
 
-class Keys:
+class KeyExpressions:
     """The keys of one arm."""
 
     def __init__(self, name: str) -> None:
@@ -50,14 +50,14 @@ class Keys:
         return f"{ROOT}/{self._name}/{topic}"
 
 
-class Session:
+class ZenohSession:
     """A session of Zenoh's. It is opened and closed in threads, for that takes a while.
 
     Attributes:
         crossing: The way of what it hears into the event loop.
     """
 
-    def __init__(self, place: Place, *, serving: bool = False) -> None:
+    def __init__(self, place: ZenohConfig, *, serving: bool = False) -> None:
         self.crossing = Crossing()
         self._place = place
         self._serving = serving

@@ -21,9 +21,9 @@ import anyio
 from dobot_async._core.protocol.transport import MANY, Transport
 from dobot_async.errors import ConnectFailed
 from dobot_async.transports.network import WINDOW
-from dobot_async.transports.zenoh.config import Place, library
-from dobot_async.transports.zenoh.messages import DATA, END, Lost, Numbered, Outbox
-from dobot_async.transports.zenoh.session import VERSION, Keys, Session
+from dobot_async.transports.zenoh.config import ZenohConfig, library
+from dobot_async.transports.zenoh.messages import DATA, END, Lost, Numbered, SendQueue
+from dobot_async.transports.zenoh.session import VERSION, KeyExpressions, ZenohSession
 
 if TYPE_CHECKING:
     import zenoh
@@ -39,7 +39,7 @@ UNREAD = 1 << 20
 
 async def open_url(url: SplitResult, *, arm: str) -> Transport:
     """Opens `zenoh://name`, with `?config=FILE` and `?connect=tcp/host:port[,...]`."""
-    place = Place.of(url, serving=False)
+    place = ZenohConfig.of(url, serving=False)
     transport = ZenohTransport(place)
     try:
         await transport.enter(arm)
@@ -59,13 +59,13 @@ class ZenohTransport:
     window = WINDOW
     reorder_window = 0.0
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: ZenohConfig) -> None:
         self._name = place.name
-        self._keys = Keys(place.name)
-        self._session = Session(place)
+        self._keys = KeyExpressions(place.name)
+        self._session = ZenohSession(place)
         self._link = ""
         self._token: zenoh.LivelinessToken | None = None
-        self._up: Outbox | None = None
+        self._up: SendQueue | None = None
         self._down = Numbered()
         self._arrived: deque[bytes] = deque()
         self._unread = 0
@@ -113,7 +113,7 @@ class ZenohTransport:
 
         self._server = server
         way = self._session.way(f"{self._link}/up", waits=True)
-        self._up = Outbox(way, lambda why: self._break(ConnectionResetError(why)), self._name)
+        self._up = SendQueue(way, lambda why: self._break(ConnectionResetError(why)), self._name)
 
     async def send(self, data: bytes) -> None:
         """Sends bytes, which wait here while the network cannot take them: far more than a link has under way."""

@@ -61,10 +61,7 @@ def rewrite(document: str, text: str) -> str:
             page = target.removeprefix("docs/")
         elif example := EXAMPLES.fullmatch(target):
             page, anchor = PAGES["examples"], f"#{example[1]}py"
-
-        elif page is None and (
-            (ROOT / target).is_dir() or (ROOT / target).suffix == ".md" and (ROOT / target).exists()
-        ):
+        elif page is None and is_of_the_repository(target):
             return f"]({REPOSITORY}/tree/main/{target}{anchor or ''})"
 
         return match[0] if page is None else f"]({relative(page, depth)}{anchor or ''})"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dobot_async._core.protocol.wire import Command, Number, Queueing, u64
-from dobot_async.arms.bridge_adapter import Kind
+from dobot_async.arms.bridge_adapter import RequestKind
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.bridge_adapter import BRIDGED, MagicianWatch
 from dobot_async.arms.magician.frame import QUEUED, WRITE, Frame
@@ -41,7 +41,7 @@ def told(index: int) -> Frame:
 def test_a_row_is_what_the_table_says(row: Command[object, object]) -> None:
     frame = Frame(row.id, row.write * WRITE, b"")
     stops = {c.SET_QUEUED_CMD_FORCE_STOP_EXEC.id, c.SET_QUEUED_CMD_STOP_EXEC.id}
-    expected = Kind.STOP if row.id in stops else Kind.WRITE if row.write else Kind.READ
+    expected = RequestKind.STOP if row.id in stops else RequestKind.WRITE if row.write else RequestKind.READ
     assert BRIDGED.kind(frame) is expected
     assert BRIDGED.name(frame) == row.name
     if row.queueing is not Queueing.NEVER:
@@ -51,19 +51,19 @@ def test_a_row_is_what_the_table_says(row: Command[object, object]) -> None:
 @pytest.mark.parametrize(
     ("frame", "kind"),
     [
-        (jog(c.JOGKey.IDLE), Kind.STOP),
-        (jog(c.JOGKey.AP_DOWN), Kind.WRITE),
-        (jog(c.JOGKey.IDLE, WRITE | QUEUED), Kind.WRITE),
-        (Frame(242, 0, b""), Kind.STOP),
-        (Frame(84, 0, PTP), Kind.WRITE),
-        (Frame(10, QUEUED, b""), Kind.WRITE),
-        (Frame(10, 0b100, b""), Kind.READ),
-        (Frame(7, 0, b""), Kind.READ),
-        (Frame(99, 0, b""), Kind.WRITE),
-        (Frame(160, 0, b""), Kind.WRITE),
+        (jog(c.JOGKey.IDLE), RequestKind.STOP),
+        (jog(c.JOGKey.AP_DOWN), RequestKind.WRITE),
+        (jog(c.JOGKey.IDLE, WRITE | QUEUED), RequestKind.WRITE),
+        (Frame(242, 0, b""), RequestKind.STOP),
+        (Frame(84, 0, PTP), RequestKind.WRITE),
+        (Frame(10, QUEUED, b""), RequestKind.WRITE),
+        (Frame(10, 0b100, b""), RequestKind.READ),
+        (Frame(7, 0, b""), RequestKind.READ),
+        (Frame(99, 0, b""), RequestKind.WRITE),
+        (Frame(160, 0, b""), RequestKind.WRITE),
     ],
 )
-def test_what_is_no_known_read_is_a_write(frame: Frame, kind: Kind) -> None:
+def test_what_is_no_known_read_is_a_write(frame: Frame, kind: RequestKind) -> None:
     assert BRIDGED.kind(frame) is kind
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dobot_async.arms.mycobot import commands as c
-from dobot_async.arms.mycobot.standstill import Goal, Verdict, Watch, cannot_read_servos, turned
+from dobot_async.arms.mycobot.standstill import Goal, StandstillDetector, Verdict, cannot_read_servos, turned
 
 GOAL = Goal(c.GET_ANGLES, {0: 10.0}, [2.0])
 STEP = 0.05
@@ -19,7 +19,7 @@ Told = tuple[float, bool]
 
 def verdicts(tell: Callable[[float], Told], seconds: float, goal: Goal = GOAL) -> list[tuple[float, Verdict]]:
     """What is made of an arm that tells its angle and its moving flag at each time."""
-    watch, found = Watch(goal, 0.0), []
+    watch, found = StandstillDetector(goal, 0.0), []
     for number in range(round(seconds / STEP)):
         now = number * STEP
         angle, moving = tell(now)
@@ -51,7 +51,7 @@ def test_the_end_of_a_fast_motion_is_believed_at_the_first_still_look() -> None:
 
 
 def test_a_fast_arm_that_is_there_needs_its_flag_alone() -> None:
-    watch = Watch(GOAL, 0.0)
+    watch = StandstillDetector(GOAL, 0.0)
     for now, angle, settled in ((0.0, 0.0, False), (0.1, 6.0, False), (0.2, 9.5, False), (0.25, 9.6, True)):
         watch.look(now, [angle], moving=True)
         assert watch.settled is settled
@@ -66,7 +66,7 @@ def test_a_creeping_arm_has_to_stand_still_twice() -> None:
 
 
 def test_the_end_is_expected_where_its_speed_leads() -> None:
-    watch = Watch(GOAL, 0.0)
+    watch = StandstillDetector(GOAL, 0.0)
     for now, angle in ((0.0, 0.0), (0.1, 2.0), (0.2, 4.0)):
         watch.look(now, [angle], moving=True)
 
@@ -109,7 +109,7 @@ def test_an_arm_that_begins_late_is_waited_for() -> None:
 
 
 def test_a_pause_starts_all_clocks_anew() -> None:
-    watch = Watch(GOAL, 0.0)
+    watch = StandstillDetector(GOAL, 0.0)
     watch.look(0.0, [0.0], moving=False)
     watch.hold(5.0)
     assert watch.look(5.0, [0.0], moving=False) is Verdict.GOING
@@ -119,7 +119,7 @@ def test_a_pause_starts_all_clocks_anew() -> None:
 
 @given(st.lists(st.floats(-170, 170), min_size=1, max_size=60))
 def test_no_reading_makes_an_arm_arrive_that_is_not_there(angles: list[float]) -> None:
-    watch = Watch(GOAL, 0.0)
+    watch = StandstillDetector(GOAL, 0.0)
     found = [watch.look(number * STEP, [angle], moving=False) for number, angle in enumerate(angles)]
     for place, verdict in enumerate(found):
         if verdict is Verdict.ARRIVED:

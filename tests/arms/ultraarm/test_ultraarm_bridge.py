@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 from dobot_async import MotionStopped, UltraArm, UltraArmJog
 from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.protocol.wire import Command
-from dobot_async.arms.bridge_adapter import Kind
+from dobot_async.arms.bridge_adapter import RequestKind
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.bridge_adapter import BRIDGED, UltraArmWatch
-from dobot_async.arms.ultraarm.bridge_lines import Answers, Line, Requests
+from dobot_async.arms.ultraarm.bridge_lines import Answers, BridgedLine, Requests
 from dobot_async.bridge import Bridge, BridgeEvent, bridge
 from dobot_async.errors import CommandRejected, ConnectionLost, ProtocolError
 from dobot_async.simulator import Simulation, UltraArmQuirks, simulate
@@ -463,32 +463,32 @@ async def test_a_jog_of_the_driver_goes_through() -> None:
 @pytest.mark.parametrize(
     ("line", "kind"),
     [
-        (b"M12", Kind.READ),
-        (b"m 114 ", Kind.READ),
-        (b"M52 J4 S8", Kind.READ),
-        (b"M15", Kind.STOP),
-        (b"M17", Kind.STOP),
-        (b"G0 X1", Kind.WRITE),
-        (b"G90", Kind.WRITE),
-        (b"M31", Kind.WRITE),
-        (b"M114 G28", Kind.WRITE),
-        (b"M15 X1", Kind.WRITE),
-        (b"M999", Kind.WRITE),
-        (b"X200", Kind.WRITE),
-        (b"%", Kind.WRITE),
+        (b"M12", RequestKind.READ),
+        (b"m 114 ", RequestKind.READ),
+        (b"M52 J4 S8", RequestKind.READ),
+        (b"M15", RequestKind.STOP),
+        (b"M17", RequestKind.STOP),
+        (b"G0 X1", RequestKind.WRITE),
+        (b"G90", RequestKind.WRITE),
+        (b"M31", RequestKind.WRITE),
+        (b"M114 G28", RequestKind.WRITE),
+        (b"M15 X1", RequestKind.WRITE),
+        (b"M999", RequestKind.WRITE),
+        (b"X200", RequestKind.WRITE),
+        (b"%", RequestKind.WRITE),
     ],
 )
-def test_what_is_not_wholly_understood_is_a_write(line: bytes, kind: Kind) -> None:
-    assert BRIDGED.kind(Line(line + b"\r")) is kind
+def test_what_is_not_wholly_understood_is_a_write(line: bytes, kind: RequestKind) -> None:
+    assert BRIDGED.kind(BridgedLine(line + b"\r")) is kind
 
 
 @pytest.mark.parametrize(
     "line", [b"M31", b"m031", b"M31.0", b"M31.", b"M+31", b"M 31", b"N5 M31", b"M31X", b"M+031.00 S1"]
 )
 def test_however_a_command_is_written_it_is_denied(line: bytes) -> None:
-    request = Line(line + b"\r")
+    request = BridgedLine(line + b"\r")
     assert BRIDGED.subject(request) in BRIDGED.denials["calibration"]
-    assert BRIDGED.kind(request) is Kind.WRITE
+    assert BRIDGED.kind(request) is RequestKind.WRITE
 
 
 @pytest.mark.parametrize(
@@ -496,7 +496,7 @@ def test_however_a_command_is_written_it_is_denied(line: bytes) -> None:
 )
 def test_what_is_not_one_command_with_a_whole_number_is_refused(line: bytes) -> None:
     with pytest.raises(ProtocolError):
-        BRIDGED.check(Line(line + b"\r"))
+        BRIDGED.check(BridgedLine(line + b"\r"))
 
 
 @given(st.lists(st.sampled_from([b"M12", b"M9", b"M120", b"M119", b"M114", b"G0 X1", b"M15"]), max_size=12), st.data())
@@ -515,39 +515,39 @@ def test_however_lines_are_cut_and_joined_each_is_there_once(lines: list[bytes],
 def test_no_bytes_are_too_much_for_the_parsers(data: bytes) -> None:
     for parser in (Requests(), Answers()):
         for frame in parser.feed(data):
-            assert BRIDGED.kind(frame) in Kind
+            assert BRIDGED.kind(frame) in RequestKind
             assert frame.aside or frame.key.endswith("M114")
 
 
 def test_a_watch_knows_what_moves_and_what_burns() -> None:
     now = 0.0
     watch = UltraArmWatch(lambda: now)
-    rest = Line(b"Moving end\r\nQUEUE SIZE[0]\r\nENDSTOP[0,0,0]\r\nCOORDS[0,0,0,0]")
-    busy = Line(b"Moving\r\nQUEUE SIZE[0]\r\nENDSTOP[0,0,0]\r\nCOORDS[0,0,0,0]")
+    rest = BridgedLine(b"Moving end\r\nQUEUE SIZE[0]\r\nENDSTOP[0,0,0]\r\nCOORDS[0,0,0,0]")
+    busy = BridgedLine(b"Moving\r\nQUEUE SIZE[0]\r\nENDSTOP[0,0,0]\r\nCOORDS[0,0,0,0]")
     assert not watch.moving(busy), "for somebody else"
-    watch.sent(Line(b"G0 X1\r"))
+    watch.sent(BridgedLine(b"G0 X1\r"))
     assert watch.moving(None)
     assert watch.moving(rest), "it may not have begun"
     now = 1.0
     assert watch.moving(busy)
     assert not watch.moving(rest)
-    watch.sent(Line(b"M21 P200\r"))
+    watch.sent(BridgedLine(b"M21 P200\r"))
     assert watch.moving(rest)
     end(watch, b"M21 P0\r")
     assert not watch.moving(rest)
-    watch.sent(Line(b"M3\r"))
+    watch.sent(BridgedLine(b"M3\r"))
     assert watch.moving(rest)
     end(watch, b"M5\r")
     assert watch.moving(busy), "it may not have come to that yet"
     assert not watch.moving(rest)
-    watch.sent(Line(b"M15\r"))
+    watch.sent(BridgedLine(b"M15\r"))
     assert watch.moving(rest), "the stop may have thrown M5 away"
 
 
 def end(watch: UltraArmWatch, line: bytes) -> None:
     """Something is switched off, which is acknowledged."""
-    watch.sent(Line(line))
-    watch.answered(Line(line), Line(b"ok\r\n"))
+    watch.sent(BridgedLine(line))
+    watch.answered(BridgedLine(line), BridgedLine(b"ok\r\n"))
 
 
 @pytest.mark.parametrize("cut", range(1, 12))

@@ -6,7 +6,7 @@ import math
 
 from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.mycobot.arm import SimulatedMyCobot
-from dobot_async.simulator.mycobot.kinematics import Frame
+from dobot_async.simulator.mycobot.kinematics import Transform
 from dobot_async.simulator.scene.geometry import Placement
 from dobot_async.simulator.scene.things import ColorSpot, LightBeam, Tool
 
@@ -51,7 +51,7 @@ class MyCobotInScene:
         if len(point) == 4:
             return Placement(point[0], point[1], point[2] - tool.length, point[3])
 
-        frame = Frame.of(point)
+        frame = Transform.of(point)
         x, y, z = (p + row[2] * tool.length for p, row in frame.rows)
         return Placement(x, y, z, math.degrees(math.atan2(frame.rotation[1][0], frame.rotation[0][0])))
 
