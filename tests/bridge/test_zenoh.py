@@ -543,7 +543,7 @@ READINGS = {
     "motion": {"time", "index", "moving", "controller"},
     "alarms": {"time", "alarms"},
     "link": {
-        *("time", "state", "outages", "clients", "controller", "sent", "received", "repeated", "timeouts"),
+        *("time", "state", "outages", "clients", "controller", "sent", "received", "repeated", "lost", "timeouts"),
         *("unexpected", "junk_bytes", "bad_frames"),
     },
 }

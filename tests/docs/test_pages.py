@@ -14,7 +14,7 @@ from dobot_docs.command_rows import Row, rows
 from dobot_docs.device_limits import LIMITS
 from dobot_docs.docstrings import literal_blocks, return_type
 from dobot_docs.names import INSIDE, TOP, described_at, modules, page_modules, public_names
-from dobot_docs.outside import SHOWN, rewrite, text_of
+from dobot_docs.outside import REPOSITORY, SHOWN, rewrite, text_of
 from dobot_docs.reference import KINDS, kind_of
 from dobot_docs.wire_formats import describe
 
@@ -195,6 +195,8 @@ def test_what_a_verb_returns_is_told_by_where_it_is() -> None:
     [
         ("concepts", "[a](../examples/cp_drawing.py)", "[a](reference/examples.md#cp_drawingpy)"),
         ("concepts", "[a](../examples)", "[a](reference/examples.md)"),
+        ("concepts", "[a](../examples/zenoh)", f"[a]({REPOSITORY}/tree/main/examples/zenoh)"),
+        ("concepts", "[a](../nowhere.md)", "[a](../nowhere.md)"),
         ("concepts", "[a](../README.md#safety)", "[a](project/readme.md#safety)"),
         ("concepts", "[a](../CONTRIBUTING.md#one-test)", "[a](project/contributing.md#one-test)"),
         ("decisions/0001-x", "[a](../../examples)", "[a](../reference/examples.md)"),

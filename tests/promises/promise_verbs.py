@@ -40,9 +40,11 @@ INTERNAL = frozenset(
         "begin_stop",  # what the arms and the poller do with the queue
         "beside",
         "cancel_writer",
+        "count",
         "give_up",
         "led_by",
         "look",
+        "note",
         "rest",
         "roaming",
         "watch",

@@ -8,6 +8,7 @@ what it stands for on the arm, on its queue, and in a batch.
 
 from __future__ import annotations
 
+import inspect
 import re
 from pydoc import locate
 from typing import Any, Generic, TypeVar, get_args, get_origin
@@ -52,8 +53,11 @@ def return_type(kind: type[Any]) -> str | None:
     return None
 
 
-def process_docstring(_app: Sphinx, _what: str, _name: str, _obj: object, _options: object, lines: list[str]) -> None:
-    """What Sphinx asks for each docstring."""
+def process_docstring(_app: Sphinx, what: str, _name: str, obj: object, _options: object, lines: list[str]) -> None:
+    """What Sphinx asks for each docstring; that of a constant's class says nothing about the constant."""
+    if what == "data" and lines and lines[0] and (inspect.getdoc(type(obj)) or "").startswith(lines[0]):
+        lines.clear()
+
     lines[:] = [ENDING.sub(r"\1\\ ", line) for line in literal_blocks(lines)]
 
 

@@ -17,7 +17,7 @@ from sphinx.application import Sphinx
 
 from dobot_docs.names import ROOT
 
-__all__ = ["SHOWN", "register", "rewrite", "text_of"]
+__all__ = ["REPOSITORY", "SHOWN", "register", "rewrite", "text_of"]
 
 REPOSITORY = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["urls"]["Repository"]
 RELATIVE = re.compile(r"\]\((?![a-z]+:|#)([^)\s]+)\)")
@@ -61,15 +61,18 @@ def rewrite(document: str, text: str) -> str:
             page = target.removeprefix("docs/")
         elif example := EXAMPLES.fullmatch(target):
             page, anchor = PAGES["examples"], f"#{example[1]}py"
-
-        elif page is None and (
-            (ROOT / target).is_dir() or ((ROOT / target).suffix == ".md" and (ROOT / target).exists())
-        ):
+        elif page is None and is_of_the_repository(target):
             return f"]({REPOSITORY}/tree/main/{target}{anchor or ''})"
 
         return match[0] if page is None else f"]({relative(page, depth)}{anchor or ''})"
 
     return LINK.sub(changed, text)
+
+
+def is_of_the_repository(target: str) -> bool:
+    """Whether a target is a folder, or a page outside of docs/."""
+    path = ROOT / target
+    return path.is_dir() or (path.suffix == ".md" and path.is_file())
 
 
 def relative(page: str, depth: int) -> str:

@@ -30,7 +30,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 import dobot_async
-from dobot_docs.names import ROOT, modules, owned_names, page_modules, shared_names
+from dobot_docs.names import ROOT, TOP, modules, owned_names, page_modules, shared_names
 
 __all__ = ["HELD", "KINDS", "kind_of", "register"]
 
@@ -99,10 +99,15 @@ def entry(name: str, value: object) -> Iterator[str]:
     if isinstance(value, type):
         yield "   :members:"
         yield "   :undoc-members:"
-        yield "   :inherited-members: BaseException, int, tuple, Enum, MCPServer"
+        yield f"   :inherited-members: {', '.join(foreign(value)) or 'object'}"
         yield f"   :exclude-members: {', '.join(INSIDE)}"
 
     yield ""
+
+
+def foreign(kind: type[Any]) -> list[str]:
+    """The classes of Python, and of other libraries, that a class comes from: their members are described elsewhere."""
+    return [each.__name__ for each in kind.__mro__ if each.__module__.partition(".")[0] != TOP]
 
 
 class Described(SphinxDirective):
