@@ -18,11 +18,11 @@ PAGE = Path(__file__).parents[1] / "docs" / "adding-a-family.md"
 PARTS = ("simulator", "scene", "bridge", "discovery", "cli", "fleet", "program")
 
 PROGRAM = """
-from dobot_async.cli.family import Family as Shown, Told
+from dobot_async.cli.family import CommandAnswer, FamilyCommands
 
 async def told(arm):
     angle = await arm.get_angle()
-    return Told({"angle": angle}, f"angle {angle:g}")
+    return CommandAnswer({"angle": angle}, f"angle {angle:g}")
 
 async def turn(arm, numbers, mode):
     await arm.turn_to(numbers[0])
@@ -32,7 +32,7 @@ class Chosen(Turntable):
     def connect(cls, url, *, control=True, queue="fresh", on_error="stop"):
         return super().connect(url, control=control)
 
-SHOWN = Shown(
+SHOWN = FamilyCommands(
     kind=Chosen, info=told, pose=told, read=told, move=turn, modes=("to",), jog=None, directions={}, suction=None,
     pieces=None,
 )
