@@ -8,6 +8,7 @@ import itertools
 import json
 import logging
 import socket
+import warnings
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, suppress
 from typing import Any
@@ -80,7 +81,10 @@ async def hall() -> AsyncIterator[Hall]:
             await cancel_and_join(task)
 
         del rest
-        gc.collect()  # the broker leaves the socket of a client that is cut off to the collector
+        await asyncio.sleep(0)  # sockets that it has closed just now are closed in the loop's next turn
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)
+            gc.collect()  # the broker leaves the socket of a client that is cut off to the collector
 
 
 class Ear:
