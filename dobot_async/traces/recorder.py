@@ -51,7 +51,7 @@ class Queue(Protocol):
     @property
     def on_motion(self) -> Hooks[[Motion]]:
         """Called with each Motion when it was put, was accepted, and has ended."""
-        raise NotImplementedError
+        ...
 
 
 @contextmanager

@@ -20,7 +20,7 @@ class Describe(Protocol):
 
     def __call__(self, frame: Any, *, outgoing: bool) -> Mapping[str, object]:
         """Return "command", "value" and "raw", and "problem" where the parameters do not fit."""
-        raise NotImplementedError
+        ...
 
 
 @dataclass(frozen=True, slots=True)
