@@ -406,8 +406,9 @@ async def test_a_stop_goes_out_at_once_although_another_one_was_given_up() -> No
         await stop
 
 
-async def test_the_acknowledgement_of_a_stop_is_seen_although_another_one_was_given_up() -> None:
-    async with line() as (link, wire):
+@pytest.mark.parametrize("reorder_window", [0.0, 0.02])
+async def test_the_acknowledgement_of_a_stop_is_seen_although_another_one_was_given_up(reorder_window: float) -> None:
+    async with line(reorder_window=reorder_window) as (link, wire):
         wire.dead = True
         with pytest.raises(ReplyTimeout):
             await link.request(STOP, None, urgent=True, timeout=3)

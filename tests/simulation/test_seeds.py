@@ -26,6 +26,7 @@ HARD = {
     800859: "an acknowledgement that comes late, when its command is known to be taken, and another one was sent",
     801433: "an arm that was switched off and on once, and not again",
     6023359: "a stop whose first copy was thought to be lost, and is acknowledged twice",
+    8001935: "stops that a line of datagrams holds up, one after the other: each acknowledgement is an older one's",
     153: "a question that waits for its turn, and then for its answer",
 }
 """What once broke a promise, each found in the scenario as it is now."""

@@ -170,8 +170,8 @@ class Exchange(Connection, Generic[F]):
         while left := self._left(deadline):
             ready()
             self._stats.repeated += bool(copies)
-            # Copies of an earlier stop, which a silent line has swallowed, would take the answers to these one by one.
-            behind = self._correlator.newest(frame.key) is not None and not self._correlator.reorder_window
+            # Copies of an earlier stop, which nobody awaits any more, would take the answers to these one by one.
+            behind = self._correlator.newest(frame.key) is not None
             alive = not copies or self.heard_at >= copies[-1].sent_at
             with suppress(ReplyTimeout):
                 last = await self.send(frame, accept, timeout=left, proves=not self._suspected(frame.key))
