@@ -12,9 +12,9 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.contract import Frame
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.arms.bridge_adapter import BridgeAdapter
-from dobot_async.bridge.doors import Listeners, open_doors
 from dobot_async.bridge.families import family_of
 from dobot_async.bridge.limits import Limits
+from dobot_async.bridge.listeners import Listeners, open_listeners
 from dobot_async.bridge.service import Bridge
 from dobot_async.errors import ConnectFailed, DobotError
 
@@ -86,7 +86,7 @@ async def bridge(
         )
         stack.push_async_callback(lambda: run_shielded(running.aclose()))
         await greet(running.link, known, timeout)
-        running.urls = await open_doors(doors, running, stack, running.turned_away)
+        running.urls = await open_listeners(doors, running, stack, running.turned_away)
         running.token = doors.token
         stack.callback(running.end)
         yield running

@@ -50,7 +50,7 @@ async def on_zenoh(bridge: Bridge[Any], stack: AsyncExitStack, url: SplitResult)
     """Serves an arm on Zenoh until the stack is closed; returns the URL for clients on this computer."""
     place = ZenohConfig.of(url, serving=True)
     place = replace(place, listen=tuple(map(with_port, place.listen)))
-    door = Door(bridge, place)
+    door = ZenohListener(bridge, place)
     stack.push_async_callback(door.aclose)
     await door.open()
     telemetry = Telemetry(bridge, door.session, door.keys)
@@ -78,7 +78,7 @@ def reachable(endpoint: str) -> str:
     return endpoint
 
 
-class Door:
+class ZenohListener:
     """Lets clients in.
 
     Attributes:
@@ -93,7 +93,7 @@ class Door:
         self.bridge = bridge
         self._name = place.name
         self._present: dict[str, None] = {}
-        self._guests: dict[str, Guest] = {}
+        self._guests: dict[str, ZenohConnection] = {}
         self._leaving: set[asyncio.Task[None]] = set()
         self._told = Allowance(STRANGERS, asyncio.get_running_loop().time)
         self._token: zenoh.LivelinessToken | None = None
@@ -133,13 +133,13 @@ class Door:
         """Returns the way to a client."""
         return self.session.way(f"{self.keys.link}/{name}/down", waits=waits)
 
-    def cut(self, guest: Guest, why: str) -> None:
+    def cut(self, guest: ZenohConnection, why: str) -> None:
         """Ends the connection of a client that does what it must not."""
         if self._guests.get(guest.name) is guest:
             self.bridge.cut(guest.peer, why)
             self.leave(guest, why)
 
-    def leave(self, guest: Guest, why: str) -> None:
+    def leave(self, guest: ZenohConnection, why: str) -> None:
         """Ends the connection of a client, as far as there is one."""
         if self._guests.get(guest.name) is guest:
             del self._guests[guest.name]
@@ -204,7 +204,7 @@ class Door:
             query.reply_err(b"its liveliness token has not been seen")
         else:
             if name not in self._guests:
-                self._guests[name] = Guest(self, name, f"zenoh:{given}")
+                self._guests[name] = ZenohConnection(self, name, f"zenoh:{given}")
 
             query.reply(query.key_expr, b"")
 
@@ -230,7 +230,7 @@ class Door:
         return True
 
 
-class Guest:
+class ZenohConnection:
     """A client that was let in.
 
     Attributes:
@@ -239,7 +239,7 @@ class Guest:
         peer: What the bridge keeps of it.
     """
 
-    def __init__(self, door: Door, name: str, shown: str) -> None:
+    def __init__(self, door: ZenohListener, name: str, shown: str) -> None:
         self.name = name
         self.outbox = SendQueue(door.way(name, waits=True), partial(door.cut, self), name)
         self._door = door

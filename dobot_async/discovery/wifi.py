@@ -53,7 +53,7 @@ class WiFiModules:
 
         end = asyncio.get_running_loop().time() + timeout
         async with AsyncExitStack() as stack:
-            ear = Ear()
+            ear = ReplySocket()
             mouths: list[tuple[Any, tuple[str, int]]] = []
             refused: list[OSError] = []
             for own, target in ways:
@@ -78,7 +78,7 @@ class WiFiModules:
                 raise ear.errors[-1]
 
 
-class Ear(asyncio.DatagramProtocol):
+class ReplySocket(asyncio.DatagramProtocol):
     """Where answers arrive.
 
     Attributes:

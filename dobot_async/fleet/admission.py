@@ -13,11 +13,11 @@ from itertools import combinations
 from typing import Any
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
+from dobot_async.fleet.concurrent import run_concurrently
 from dobot_async.fleet.errors import ZoneDeadlock
+from dobot_async.fleet.fleet_arm import FleetArm
 from dobot_async.fleet.guard import Guard
-from dobot_async.fleet.seat import FleetArm
-from dobot_async.fleet.work import side_by_side
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneRequest
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["admit_together", "turns"]
@@ -48,7 +48,7 @@ async def admit_together(
     """
     loop = asyncio.get_running_loop()
     deadline = None if timeout is None else loop.time() + timeout
-    courses = await side_by_side({name: seat.plan(motions[name]) for name, seat in seats.items()})
+    courses = await run_concurrently({name: seat.plan(motions[name]) for name, seat in seats.items()})
     guards = {name: seat.guard for name, seat in seats.items() if seat.guard}
     for (one, guard), (other, its) in combinations(guards.items(), 2):
         shared = (courses[one].zones & (courses[other].zones | its.holds)) | (guard.holds & courses[other].zones)
@@ -100,7 +100,7 @@ async def claim_for_all(
     )
 
     async def check() -> None:
-        await side_by_side({name: guard.check() for name, guard in guards.items()})
+        await run_concurrently({name: guard.check() for name, guard in guards.items()})
 
     left = None if deadline is None else max(0.0, deadline - asyncio.get_running_loop().time())
     return await zones.claim(claim, left, check)

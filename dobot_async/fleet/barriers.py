@@ -9,8 +9,8 @@ from functools import partial
 
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async.errors import ReplyTimeout
-from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks
 from dobot_async.fleet.errors import BarrierBroken, ZoneDeadlock
+from dobot_async.fleet.zone_locks import ProgramWait, ZoneHolder, ZoneLocks
 from dobot_async.fleet.zones import FleetProgram
 
 __all__ = ["Barriers"]

@@ -28,13 +28,13 @@ from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.arms.ultraarm.queue import UltraArmBatch
 from dobot_async.errors import MotionStopped, ReplyTimeout
 from dobot_async.fleet.cell import read_cell
-from dobot_async.fleet.crew import OnFailure
+from dobot_async.fleet.concurrent import run_all
 from dobot_async.fleet.families import AnyArm
+from dobot_async.fleet.fleet_arm import Member, tell_to_stop
+from dobot_async.fleet.fleet_base import OnFailure
 from dobot_async.fleet.frames import BaseFrame, Place
 from dobot_async.fleet.programs import Programs
-from dobot_async.fleet.seat import Member, tell_to_stop
-from dobot_async.fleet.together import Launch, Together, abandon
-from dobot_async.fleet.work import all_of
+from dobot_async.fleet.together import SynchronizedStart, Together, abandon
 from dobot_async.fleet.zones import here
 
 __all__ = ["Fleet", "OnFailure"]
@@ -193,7 +193,7 @@ class Fleet(Programs[A]):
         self._zones.claims.stop(error)
         stops = {seat.name: seat.begin_stop(MotionStopped("the arm was told to stop")) for seat in seats}
         await asyncio.wait(stops.values(), timeout=within)
-        await all_of({name: stopped(stop, timeout) for name, stop in stops.items()})
+        await run_all({name: stopped(stop, timeout) for name, stop in stops.items()})
 
     async def recover(self) -> None:
         """Makes all arms ready again after a failure: clears alarms and queues, and lets them move.
@@ -203,7 +203,7 @@ class Fleet(Programs[A]):
         """
         await self._stops_heard()
         reasons = {name: seat.stopped for name, seat in self._seats.items()}
-        await all_of({name: seat.recover() for name, seat in self._seats.items()})
+        await run_all({name: seat.recover() for name, seat in self._seats.items()})
         self._barriers.forget()
         for name, seat in self._seats.items():
             if seat.stopped is reasons[name]:  # else another failure has stopped it meanwhile
@@ -256,7 +256,9 @@ class Fleet(Programs[A]):
         commanded = {name: seat for name, seat in seats.items() if batches[name].motions}
         if commanded:
             try:
-                together.start = await Launch(commanded, batches, epochs, self._zones, check_timeout(timeout)).run()
+                together.start = await SynchronizedStart(
+                    commanded, batches, epochs, self._zones, check_timeout(timeout)
+                ).run()
             except BaseException:
                 abandon(batches)
                 raise

@@ -18,12 +18,12 @@ from contextlib import asynccontextmanager
 from typing import Literal, TypeVar
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
-from dobot_async.fleet.course import PlannedCourse, PlannedStep, shifted
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.limits import FleetLimits
+from dobot_async.fleet.planned_steps import PlannedStep, PlannedSteps, shifted
 from dobot_async.fleet.planner import Planner, Stance
-from dobot_async.fleet.whereabouts import Stops, Whereabouts
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneRequest
+from dobot_async.fleet.zone_tracker import StopWaiter, ZoneTracker
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Guard", "Mode"]
@@ -32,7 +32,7 @@ Mode = Literal["off", "wait", "raise"]
 S = TypeVar("S", bound=Stance)
 
 
-class Guard(Whereabouts[S]):
+class Guard(ZoneTracker[S]):
     """The guard of one arm.
 
     Args:
@@ -51,7 +51,7 @@ class Guard(Whereabouts[S]):
         self,
         steps: deque[PlannedStep],
         planner: Planner[S],
-        queue: Stops,
+        queue: StopWaiter,
         zones: Zones,
         party: ZoneHolder,
         *,
@@ -64,7 +64,7 @@ class Guard(Whereabouts[S]):
         self.patient = mode == "wait"
         self._limits = limits
 
-    async def plan(self, motions: Sequence[Motion]) -> PlannedCourse[S]:
+    async def plan(self, motions: Sequence[Motion]) -> PlannedSteps[S]:
         """Look at commands that are to be sent together; nothing is held yet.
 
         Raises:
@@ -99,7 +99,7 @@ class Guard(Whereabouts[S]):
 
             stance = plan.end
 
-        return PlannedCourse(steps, stance, changes)
+        return PlannedSteps(steps, stance, changes)
 
     async def claim(self, zones: frozenset[str], deadline: float | None) -> ZoneRequest | None:
         """Wait for zones, or raise, as the mode says.

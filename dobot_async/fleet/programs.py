@@ -9,10 +9,10 @@ from functools import partial
 from typing import Any, Concatenate, ParamSpec, TypeVar, overload
 
 from dobot_async.errors import DobotError
-from dobot_async.fleet.claims import ZoneHolder
-from dobot_async.fleet.crew import FleetBase
-from dobot_async.fleet.seat import FleetArm
-from dobot_async.fleet.work import named, side_by_side
+from dobot_async.fleet.concurrent import run_concurrently, with_arm_name
+from dobot_async.fleet.fleet_arm import FleetArm
+from dobot_async.fleet.fleet_base import FleetBase
+from dobot_async.fleet.zone_locks import ZoneHolder
 from dobot_async.fleet.zones import FleetProgram, Run, here, running
 
 __all__ = ["Programs"]
@@ -57,12 +57,12 @@ class Programs(FleetBase[A]):
                     part.check()
                     return await does(*args, **kwargs)
             except (DobotError, ValueError) as error:
-                named(seat.name, error)
+                with_arm_name(seat.name, error)
                 raise
 
         async with self._stopping_others():
             work = {name: done(seat) for name, seat in self._seats.items()}
-            return await side_by_side(work, ends=self._ends, causes=self._causes)
+            return await run_concurrently(work, ends=self._ends, causes=self._causes)
 
     async def run(self, programs: Mapping[str, Coroutine[Any, Any, T]]) -> dict[str, T]:
         """Runs programs side by side, and returns what each has returned.
@@ -90,7 +90,7 @@ class Programs(FleetBase[A]):
             except BaseException as error:
                 why = f"has failed: {error or type(error).__name__}"
                 if arm and isinstance(error, ValueError):
-                    named(name, error)
+                    with_arm_name(name, error)
 
                 raise
             finally:
@@ -100,7 +100,7 @@ class Programs(FleetBase[A]):
         async with self._stopping_others():
             try:
                 work = {name: ran(name, each) for name, each in programs.items()}
-                return await side_by_side(work, ends=self._ends, causes=self._causes)
+                return await run_concurrently(work, ends=self._ends, causes=self._causes)
             finally:
                 self._barriers.forget(run)
 

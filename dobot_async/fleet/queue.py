@@ -1,7 +1,7 @@
 """The queue of an arm in a fleet: it asks the fleet before it sends, and tells it what ends all motions.
 
-arm.queue.put_all --> Overseer.admitted --> the arm
-arm.queue.fail    --> Overseer.ended
+arm.queue.put_all --> MotionGate.admitted --> the arm
+arm.queue.fail    --> MotionGate.ended
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import DobotError
 from dobot_async.fleet.zones import here
 
-__all__ = ["FleetQueue", "Overseer"]
+__all__ = ["FleetQueue", "MotionGate"]
 
 
-class Overseer(Protocol):
+class MotionGate(Protocol):
     """What a queue of the fleet reports to."""
 
     def admitted(
@@ -52,7 +52,7 @@ class FleetQueue(MotionQueue):
         overseer: To whom; None until the arm is in its fleet.
     """
 
-    overseer: Overseer | None = None
+    overseer: MotionGate | None = None
 
     async def put_all(
         self, motions: Sequence[Motion], *, timeout: float | None = None, epoch: Epoch | None = None

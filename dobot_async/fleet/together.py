@@ -22,14 +22,14 @@ from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import MotionStopped, another
 from dobot_async.fleet.admission import admit_together, turns
-from dobot_async.fleet.seat import FleetArm, tell_to_stop
-from dobot_async.fleet.work import on_the_way_out, side_by_side
+from dobot_async.fleet.concurrent import on_the_way_out, run_concurrently
+from dobot_async.fleet.fleet_arm import FleetArm, tell_to_stop
 from dobot_async.fleet.zones import Zones
 
-__all__ = ["Launch", "Start", "Together", "abandon"]
+__all__ = ["Start", "SynchronizedStart", "Together", "abandon"]
 
 
-class Collected(Protocol):
+class CollectedBatch(Protocol):
     """A batch, as far as its start is concerned."""
 
     @property
@@ -38,7 +38,7 @@ class Collected(Protocol):
         ...
 
 
-B = TypeVar("B", bound=Collected)
+B = TypeVar("B", bound=CollectedBatch)
 SAMPLES = 7
 PLENTY = 1000  # commands that a queue on this side takes
 LEAD = 0.003  # seconds from the decision to the first release, for all to be ready to send
@@ -98,18 +98,18 @@ class Together(Generic[B]):
 
     async def wait(self) -> None:
         """Returns when all motions are done; raises the first failure when all have ended."""
-        await side_by_side(
+        await run_concurrently(
             {name: wait_for(batch) for name, batch in self.batches.items()}, ends=lambda _name, _error: False
         )
 
 
-async def wait_for(batch: Collected) -> None:
+async def wait_for(batch: CollectedBatch) -> None:
     """Waits for all motions of a batch."""
     for motion in list(batch.motions):
         await motion
 
 
-def abandon(batches: Mapping[str, Collected]) -> None:
+def abandon(batches: Mapping[str, CollectedBatch]) -> None:
     """Ends the Motions of batches that were not sent."""
     for batch in batches.values():
         for motion in batch.motions:
@@ -118,7 +118,7 @@ def abandon(batches: Mapping[str, Collected]) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Launch:
+class SynchronizedStart:
     """A start under way.
 
     Attributes:
@@ -130,7 +130,7 @@ class Launch:
     """
 
     seats: Mapping[str, FleetArm]
-    batches: Mapping[str, Collected]
+    batches: Mapping[str, CollectedBatch]
     epochs: Mapping[str, Epoch]
     zones: Zones
     timeout: float | None
@@ -151,7 +151,7 @@ class Launch:
         self.check()
         async with turns(seats):
             self.check()
-            await side_by_side({name: seat.queue.join(self.timeout) for name, seat in seats.items()})
+            await run_concurrently({name: seat.queue.join(self.timeout) for name, seat in seats.items()})
             self.check()
             motions = {name: self.batches[name].motions for name in seats}
             for seat in seats.values():
@@ -160,7 +160,7 @@ class Launch:
             try:
                 await admit_together(seats, motions, self.zones, self.timeout)
                 self.check()
-                latency = await side_by_side({name: measure(seat) for name, seat in seats.items()})
+                latency = await run_concurrently({name: measure(seat) for name, seat in seats.items()})
                 return await self._start(latency)
             except BaseException as error:
                 abandon(self.batches)  # before anybody watches them
@@ -174,8 +174,8 @@ class Launch:
         seats = self.seats
         try:
             pausing = {name: seat for name, seat in seats.items() if seat.family.pauses}
-            await side_by_side({name: seat.queue.pause() for name, seat in pausing.items()})
-            rooms = await side_by_side({name: room(seat) for name, seat in pausing.items()})
+            await run_concurrently({name: seat.queue.pause() for name, seat in pausing.items()})
+            rooms = await run_concurrently({name: room(seat) for name, seat in pausing.items()})
             first: dict[str, Sequence[Motion]] = {}
             rest: dict[str, Sequence[Motion]] = {}
             for name in seats:
@@ -183,16 +183,16 @@ class Launch:
                 loaded = max(1, rooms.get(name, 1) - 1)
                 first[name], rest[name] = motions[:loaded], motions[loaded:]
 
-            await side_by_side({name: self._put(name, first[name]) for name in pausing})
+            await run_concurrently({name: self._put(name, first[name]) for name in pausing})
             self.check()
             instant = asyncio.get_running_loop().time() + LEAD + max(latency.values())
-            told = await side_by_side(
+            told = await run_concurrently(
                 {name: self._release(name, instant - latency[name], first[name]) for name in seats}
             )
         finally:
             self._watch()
 
-        await side_by_side({name: self._put(name, more) for name, more in rest.items() if more})
+        await run_concurrently({name: self._put(name, more) for name, more in rest.items() if more})
         at = {name: (sent + answered) / 2 for name, (sent, answered) in told.items()}
         return Start(at, latency, max(answered - sent for sent, answered in told.values()) / 2)
 

@@ -8,7 +8,7 @@ from contextlib import nullcontext
 import anyio
 
 from dobot_async.errors import ReplyTimeout
-from dobot_async.fleet.claims import ProgramWait, ZoneHolder
+from dobot_async.fleet.zone_locks import ProgramWait, ZoneHolder
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Turn"]

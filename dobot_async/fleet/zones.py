@@ -17,7 +17,7 @@ from weakref import WeakSet
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.util.shapes import Shape
 from dobot_async.errors import DobotError, ReplyTimeout, another
-from dobot_async.fleet.claims import ZoneHolder, ZoneLocks, ZoneRequest
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneLocks, ZoneRequest
 
 __all__ = ["FleetProgram", "Run", "Zones", "here", "running"]
 

@@ -23,7 +23,7 @@ import aiomqtt
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.errors import ConnectFailed, DobotError
 from dobot_async.mqtt.broker import Broker
-from dobot_async.mqtt.desk import LONGEST, Desk
+from dobot_async.mqtt.command_handler import LONGEST, CommandHandler
 from dobot_async.mqtt.discovery import discovery_of, discovery_topic
 from dobot_async.mqtt.topics import OFFLINE, ONLINE, Topics, check_word, will_topic
 from dobot_async.remote import RemoteArm, Works, state_told
@@ -253,13 +253,13 @@ class Gateway:
     def _tell_lease(self, name: str) -> None:
         self._put(self._topics[name].lease, json.dumps({"holder": self._desks[name].holder}), retain=True)
 
-    def _desk(self, on: RemoteArm) -> Desk:
+    def _desk(self, on: RemoteArm) -> CommandHandler:
         topics = self._topics[on.name]
 
         def reply(session: str, told: dict[str, Any]) -> None:
             self._put(topics.reply(session), json.dumps(told), retain=False)
 
-        return Desk(self._works, on, reply, lambda: self._tell_lease(on.name))
+        return CommandHandler(self._works, on, reply, lambda: self._tell_lease(on.name))
 
     def _put(self, topic: str, text: str, *, retain: bool) -> None:
         """Have something published; who is not connected has nothing to say, and of too much the oldest is dropped."""

@@ -17,14 +17,14 @@ from typing import Any
 from dobot_async import Arm, ConnectFailed, Fleet
 from dobot_async._core.util.events import Events
 from dobot_async._core.util.tasks import cancel_and_join, run_shielded
-from dobot_async.bridge.doors import served_with
 from dobot_async.bridge.handshake import HANDSHAKE
+from dobot_async.bridge.listeners import served_with
 from dobot_async.fleet.member import Member
 from dobot_async.panel.access import Access, Role, is_loopback
-from dobot_async.panel.desk import Desk
-from dobot_async.panel.lease import Lease
-from dobot_async.panel.scenery import show_scene
+from dobot_async.panel.lease import OperatorLease
+from dobot_async.panel.scene import show_scene
 from dobot_async.panel.sources import sources_of
+from dobot_async.panel.state import PanelState
 from dobot_async.simulator.scene import Scene
 
 __all__ = ["Panel", "panel"]
@@ -42,7 +42,7 @@ class Panel:
         secure: Whether it speaks TLS.
     """
 
-    def __init__(self, desk: Desk, access: Access, host: str, port: int, *, secure: bool) -> None:
+    def __init__(self, desk: PanelState, access: Access, host: str, port: int, *, secure: bool) -> None:
         self.host = host
         self.port = port
         self.secure = secure
@@ -119,7 +119,7 @@ class Panel:
         finally:
             await run_shielded(lease.end(program, "the program gives it back"))
 
-    def _lease(self, name: str | None) -> Lease:
+    def _lease(self, name: str | None) -> OperatorLease:
         stations = self._desk.stations
         if name is None and len(stations) == 1:
             name = next(iter(stations))
@@ -198,7 +198,7 @@ async def panel(
         listener.close()
         raise
 
-    desk = Desk(sources, zones, scene=scene is not None, stop_all=fleet.stop if fleet else None)
+    desk = PanelState(sources, zones, scene=scene is not None, stop_all=fleet.stop if fleet else None)
     web = web_of(desk, access)
     async with AsyncExitStack() as stack:
         stack.push_async_callback(lambda: run_shielded(web.aclose()))

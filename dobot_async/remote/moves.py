@@ -8,8 +8,8 @@ from typing import Any, Literal, cast
 from dobot_async.handling import pick, place
 from dobot_async.handling.arms import move_straight, settle_time
 from dobot_async.remote.actions import Note, Strict, Way, action
+from dobot_async.remote.reports import pose_told
 from dobot_async.remote.site import RemoteArm
-from dobot_async.remote.told import pose_told
 
 __all__ = ["Grip", "Home", "Move", "Pick", "Place", "Recover"]
 
@@ -113,7 +113,7 @@ class Move(Strict):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Handling(Strict):
+class PickOrPlace(Strict):
     """What picking and placing have in common."""
 
     x: float
@@ -154,7 +154,7 @@ class Handling(Strict):
 
 @action
 @dataclass(frozen=True, kw_only=True)
-class Pick(Handling):
+class Pick(PickOrPlace):
     """Pick a part up."""
 
     do: Literal["pick"] = "pick"
@@ -170,7 +170,7 @@ class Pick(Handling):
 
 @action
 @dataclass(frozen=True, kw_only=True)
-class Place(Handling):
+class Place(PickOrPlace):
     """Put down what the tool holds."""
 
     do: Literal["place"] = "place"

@@ -8,7 +8,7 @@ import pytest
 
 from dobot_async import DobotError, MotionStopped
 from dobot_async.fleet import ZoneDeadlock, ZoneOccupied
-from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
+from dobot_async.fleet.zone_locks import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
 
 
 class Asked(ZoneRequest):

@@ -13,7 +13,7 @@ from virtual import virtual
 from dobot_async import ArmAlarm, DobotError, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
 from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Cylinder, Member, ZoneDeadlock, ZoneOccupied
-from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneRequest
 from dobot_async.fleet.zones import Zones
 from dobot_async.simulator import Simulation, simulate
 

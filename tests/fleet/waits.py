@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
+from dobot_async.fleet.zone_locks import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
 
 __all__ = ["Scene", "Wait", "end", "named", "watch"]
 

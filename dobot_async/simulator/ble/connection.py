@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from dbus_fast import Message
 
-from dobot_async.simulator.ble.link_layer import Air, RadioSettings, SerialBridge
+from dobot_async.simulator.ble.link_layer import LinkLayer, RadioSettings, SerialBridge
 from dobot_async.simulator.simulation import SimulatedClient, Simulation
 
 __all__ = ["CONNECT", "SUBSCRIBE", "WRITE", "GattConnection"]
@@ -30,7 +30,7 @@ class GattConnection:
     """
 
     def __init__(self, radio: RadioSettings) -> None:
-        self.air = Air(radio)
+        self.air = LinkLayer(radio)
         self.line: SerialBridge | None = None
         self._loop = asyncio.get_running_loop()
         self._waiting: dict[str, Message] = {}

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["Air", "RadioSettings", "SerialBridge", "Uart", "round_trip"]
+__all__ = ["LinkLayer", "RadioSettings", "SerialBridge", "Uart", "round_trip"]
 
 BAUD_PER_BYTE = 10 / 115200
 LEAST_MTU, MOST_MTU = 23, 517
@@ -53,7 +53,7 @@ class RadioSettings:
         return self.mtu - ATT_HEADER
 
 
-class Air:
+class LinkLayer:
     """One connection: what waits for its next event, each way."""
 
     def __init__(self, radio: RadioSettings) -> None:

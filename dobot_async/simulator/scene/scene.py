@@ -21,7 +21,7 @@ from typing import Any
 
 from dobot_async.arms.registry import Parts
 from dobot_async.simulator.scene.geometry import Place3, Placement
-from dobot_async.simulator.scene.seat import Event, SceneArm, ScenePlace
+from dobot_async.simulator.scene.scene_arm import Event, SceneArm, ScenePlace
 from dobot_async.simulator.scene.stock import ABOVE_ALL, RunningBelt, Stock, Workpiece
 from dobot_async.simulator.scene.things import SEEN, Belt, Block, ColorSpot, LightBeam, Mount, Piece
 

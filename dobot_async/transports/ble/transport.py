@@ -28,8 +28,8 @@ from bleak.exc import BleakCharacteristicNotFoundError
 
 from dobot_async._core.util.tasks import Ended, run_shielded, run_within
 from dobot_async.transports.ble.diagnostics import trouble
-from dobot_async.transports.ble.lock import Claim
-from dobot_async.transports.ble.scan import INPUT, OUTPUT, Seen
+from dobot_async.transports.ble.lock import DeviceLock
+from dobot_async.transports.ble.scan import INPUT, OUTPUT, SeenDevice
 
 __all__ = ["PACE", "BleTransport"]
 
@@ -56,7 +56,7 @@ class BleTransport:
     window = 1
     reorder_window = 0.0
 
-    def __init__(self, seen: Seen, *, url: str, pace: float, adapter: str | None, claim: Claim) -> None:
+    def __init__(self, seen: SeenDevice, *, url: str, pace: float, adapter: str | None, claim: DeviceLock) -> None:
         self.url = url
         self._claim = claim
         self._pace = pace

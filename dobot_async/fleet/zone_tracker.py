@@ -23,13 +23,13 @@ from typing import Generic, Protocol, TypeVar
 
 from dobot_async.arms.magician.paths import STEP
 from dobot_async.errors import DobotError
-from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
-from dobot_async.fleet.course import PlannedCourse, PlannedStep
 from dobot_async.fleet.frames import BaseFrame
+from dobot_async.fleet.planned_steps import PlannedStep, PlannedSteps
 from dobot_async.fleet.planner import Planner, Region, Stance
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneRequest
 from dobot_async.fleet.zones import Zones
 
-__all__ = ["Stops", "Whereabouts"]
+__all__ = ["StopWaiter", "ZoneTracker"]
 
 S = TypeVar("S", bound=Stance)
 BETWEEN_READINGS = 0.1  # seconds
@@ -37,14 +37,14 @@ AT_REST = 0.05  # mm between two readings of an arm that stands; the slowest of 
 ROUNDING = 0.1  # mm; what numbers lose on the line, and an arc bulges between two places
 
 
-class Stops(Protocol):
+class StopWaiter(Protocol):
     """The arm's queue, as far as the guard is concerned."""
 
     async def stops_heard(self) -> None:
         """Return when no stop goes on any more; raise ReplyTimeout if the arm does not hear it."""
 
 
-class Whereabouts(Generic[S]):
+class ZoneTracker(Generic[S]):
     """The part of `Guard` that follows its arm.
 
     Args:
@@ -61,7 +61,7 @@ class Whereabouts(Generic[S]):
         self,
         steps: deque[PlannedStep],
         planner: Planner[S],
-        queue: Stops,
+        queue: StopWaiter,
         zones: Zones,
         party: ZoneHolder,
         *,
@@ -90,7 +90,7 @@ class Whereabouts(Generic[S]):
         """The zones that the arm is in, or has ahead."""
         return frozenset[str]().union(*(claim.zones for claim in self._claims))
 
-    def enter(self, course: PlannedCourse[S], claim: ZoneRequest | None) -> None:
+    def enter(self, course: PlannedSteps[S], claim: ZoneRequest | None) -> None:
         """Take note that what was looked at is sent now, with a claim on its zones that was granted."""
         if claim:
             self._claims.append(claim)

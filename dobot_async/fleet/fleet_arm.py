@@ -15,16 +15,16 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.arms.base import Arm
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped
-from dobot_async.fleet.claims import ZoneRequest
-from dobot_async.fleet.course import PlannedCourse, PlannedStep
+from dobot_async.fleet.concurrent import with_arm_name
 from dobot_async.fleet.families import FleetFamily, family_of
 from dobot_async.fleet.follower import Follower
 from dobot_async.fleet.guard import Guard
 from dobot_async.fleet.limits import FleetLimits
 from dobot_async.fleet.member import Member
+from dobot_async.fleet.planned_steps import PlannedStep, PlannedSteps
 from dobot_async.fleet.queue import FleetQueue
 from dobot_async.fleet.turn import Turn
-from dobot_async.fleet.work import named
+from dobot_async.fleet.zone_locks import ZoneRequest
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["FleetArm", "Member", "tell_to_stop"]
@@ -213,7 +213,7 @@ class FleetArm:
 
         self._zones.claims.interrupt(self.party, error)
         if not isinstance(error, MotionStopped):
-            named(self.name, error)
+            with_arm_name(self.name, error)
             self._failed(self, error)
 
     async def recover(self) -> None:
@@ -274,14 +274,14 @@ class FleetArm:
         self._turns.end()
         self._follower.follow()
 
-    async def plan(self, motions: Sequence[Motion]) -> PlannedCourse[Any]:
+    async def plan(self, motions: Sequence[Motion]) -> PlannedSteps[Any]:
         """Looks at what is to be sent together; see `Guard.plan`."""
         if self.guard:
             return await self.guard.plan(motions)
 
-        return PlannedCourse([PlannedStep(motion) for motion in motions], None, moves=False)
+        return PlannedSteps([PlannedStep(motion) for motion in motions], None, moves=False)
 
-    def enter(self, course: PlannedCourse[Any], claim: ZoneRequest | None) -> None:
+    def enter(self, course: PlannedSteps[Any], claim: ZoneRequest | None) -> None:
         """Takes note of what is sent now, with the claim on its zones."""
         if self.guard:
             self.guard.enter(course, claim)

@@ -23,13 +23,13 @@ from typing import Any, cast
 
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async._core.util.text import printable
-from dobot_async.bridge.desk import Refused
 from dobot_async.bridge.lease import Lease
+from dobot_async.bridge.requests import RequestRefused
 from dobot_async.errors import DobotError
 from dobot_async.mqtt.topics import SESSION
 from dobot_async.remote import RemoteArm, Works, parse_action
 
-__all__ = ["Desk", "Party"]
+__all__ = ["CommandHandler", "MqttSession"]
 
 logger = logging.getLogger("dobot_async.mqtt")
 LONGEST = 1 << 18  # bytes of a message
@@ -41,7 +41,7 @@ FREE = ("stop", "take_lease", "release_lease")
 """What needs no id: it may be done twice."""
 
 
-class Party:
+class MqttSession:
     """A session that has, or had, the lease.
 
     Attributes:
@@ -62,7 +62,7 @@ class Party:
             self.timer.cancel()
 
 
-class Desk:
+class CommandHandler:
     """See the module.
 
     Args:
@@ -83,7 +83,7 @@ class Desk:
         self._on = on
         self._reply = reply
         self._changed = changed
-        self._lease: Lease[Party] = Lease(takeover=False, leave=end_works, cut=keep, tell=self._tell)
+        self._lease: Lease[MqttSession] = Lease(takeover=False, leave=end_works, cut=keep, tell=self._tell)
         self._told: OrderedDict[tuple[str, str], dict[str, Any] | None] = OrderedDict()
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -148,7 +148,7 @@ class Desk:
     async def _take_lease(self, session: str, given: Mapping[str, Any]) -> dict[str, Any]:
         seconds = seconds_of(given)
         holder = self._lease.holder
-        party = holder if holder and holder.name == session and not holder.gone else Party(session)
+        party = holder if holder and holder.name == session and not holder.gone else MqttSession(session)
         await self._lease.take(party)
         if party.timer:
             party.timer.cancel()
@@ -169,7 +169,7 @@ class Desk:
         holder = self._lease.holder
         if holder is None or holder.gone or holder.name != session:
             who = f"{holder.name} has" if holder else "nobody has"
-            raise Refused(f"take the lease first: {who} it")
+            raise RequestRefused(f"take the lease first: {who} it")
 
         task = asyncio.current_task()
         assert task
@@ -183,7 +183,7 @@ class Desk:
         """Do a command, and say what became of it."""
         try:
             told = {"id": key, "ok": True, "value": await work}
-        except (DobotError, ValueError, TypeError, ImportError, Refused) as error:
+        except (DobotError, ValueError, TypeError, ImportError, RequestRefused) as error:
             told = {"id": key, "ok": False, "error": told_of(error)}
         except asyncio.CancelledError:
             ended = {"kind": "MotionStopped", "text": "the lease has ended, and the arm was told to stop"}
@@ -212,7 +212,7 @@ class Desk:
 
         return False
 
-    def _expire(self, party: Party) -> None:
+    def _expire(self, party: MqttSession) -> None:
         """A lease is over."""
         party.leave()
         for task in list(party.works):
@@ -225,16 +225,16 @@ class Desk:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _tell(self, what: str, party: Party, detail: str) -> None:
+    def _tell(self, what: str, party: MqttSession, detail: str) -> None:
         logger.info("%s: %s: %s: %s", self._on.name, party.name, what, detail)
         self._changed()
 
 
-def keep(_party: Party, _reason: str) -> None:
+def keep(_party: MqttSession, _reason: str) -> None:
     """Nobody takes a lease from who has it, so nobody is cut off."""
 
 
-async def end_works(party: Party) -> None:
+async def end_works(party: MqttSession) -> None:
     """End what a session has the arm do; when this returns the arm was stopped."""
     for task in list(party.works):
         await cancel_and_join(task)

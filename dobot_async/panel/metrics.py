@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dobot_async.metrics import metrics_text, read_figures
-from dobot_async.panel.desk import Desk
+from dobot_async.panel.state import PanelState
 
 __all__ = ["panel_metrics"]
 
 
-async def panel_metrics(desk: Desk) -> bytes:
+async def panel_metrics(desk: PanelState) -> bytes:
     """Return the figures of the arms that are connected; see `dobot_async.metrics`.
 
     Args:

@@ -39,7 +39,7 @@ from dobot_async.errors import ConnectFailed
 from dobot_async.transports.network import TOKEN as TOKEN_OPTION
 from dobot_async.transports.network import secret
 
-__all__ = ["Listeners", "open_doors"]
+__all__ = ["Listeners", "open_listeners"]
 
 FORMS = "tcp://127.0.0.1:0, udp://127.0.0.1:0, ws://127.0.0.1:0, zenoh://name or pty"
 
@@ -93,7 +93,7 @@ class Listeners:
         return cls(places, token, tls, frozenset(origins))
 
 
-async def open_doors(
+async def open_listeners(
     doors: Listeners, host: Bridge[Any], stack: AsyncExitStack, refuse: Callable[[str, str], None]
 ) -> tuple[str, ...]:
     """Lets clients of a host in until the stack is closed; returns the URLs in their order.

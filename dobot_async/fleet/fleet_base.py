@@ -16,9 +16,9 @@ from dobot_async._core.util.shapes import Shape
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.barriers import Barriers
-from dobot_async.fleet.claims import ZoneHolder
-from dobot_async.fleet.seat import FleetArm, Member, tell_to_stop
-from dobot_async.fleet.work import ended, named, on_the_way_out
+from dobot_async.fleet.concurrent import ended, on_the_way_out, with_arm_name
+from dobot_async.fleet.fleet_arm import FleetArm, Member, tell_to_stop
+from dobot_async.fleet.zone_locks import ZoneHolder
 from dobot_async.fleet.zones import Zones
 from dobot_async.traces.recorder import shared
 
@@ -182,7 +182,7 @@ async def host(seat: FleetArm, options: Mapping[str, Any], ready: asyncio.Future
             finally:
                 seat.end()
     except (DobotError, ValueError) as error:
-        named(seat.name, error)
+        with_arm_name(seat.name, error)
         raise
     finally:
         await run_shielded(seat.aclose())
