@@ -1,16 +1,16 @@
 """Who holds which zones, who waits for them, and who waits for whom elsewhere.
 
-No I/O and no clock: each claim is told its answer by a call.
+No I/O and no clock: each request is told its answer by a call.
 
     request --> waiting --free of others, nobody before it--> granted --> release
                    |
                    `--> ZoneDeadlock, ZoneOccupied, or whatever `fail` says
 
-A claim is for one or several zones, all of which it gets at once. Claims on the same zone are granted in the order of
-their requests. There is one exception: a claim passes an earlier one that waits, directly or not, for the party that
-asks, for that one would otherwise wait for itself. A cycle of waits that is left is a deadlock, and who closes it is
-told so. An arm that still moves may yet leave a zone by itself; whether it does shows when it stands. So all claims are
-judged anew when an arm comes to rest, as when something is released, also if it does not tell where it stands.
+A request is for one or several zones, and gets all of them at once. Requests for the same zone are granted in their
+order, with one exception: a request passes an earlier one that waits, directly or not, for the holder that asks. That
+one would otherwise wait for itself. A remaining cycle of waits is a deadlock, and the request that closes it fails. An
+arm in motion may still leave a zone by itself; whether it does is known when it rests. So all requests are decided
+again when something is released and when an arm comes to rest, even if its pose is not known then.
 """
 
 from __future__ import annotations
@@ -49,18 +49,18 @@ class ZoneRequest:
     """A wish for zones, and the hold on them once it is granted.
 
     Attributes:
-        party: Who holds the zones then.
-        own: The parties that do not stand in its way: itself, and those that it acts for.
+        holder: Who holds the zones then.
+        own: The holders that do not stand in its way: itself, and those that it acts for.
         zones: What it is for.
         answer: Called once: with None when it is granted, with the error when it never will be.
         patient: False gives it an error where it would have to wait.
-        stuck: The parties that release nothing as long as it waits: its own, and the arms that wait for its command.
-        asker: Who goes on when it is answered; by default `party`.
-        movers: The arms that move when it is granted, whose stop ends it; by default `party`.
+        stuck: The holders that release nothing as long as it waits: its own, and the arms that wait for its command.
+        asker: Who goes on when it is answered; by default `holder`.
+        movers: The arms that move when it is granted, whose stop ends it; by default `holder`.
         parked: Tells of an arm that stands whether nobody is left who would move it.
     """
 
-    party: ZoneHolder
+    holder: ZoneHolder
     own: frozenset[ZoneHolder]
     zones: frozenset[str]
     answer: Callable[[DobotError | None], None] = field(default=lambda _: None)
@@ -72,8 +72,8 @@ class ZoneRequest:
 
     def __post_init__(self) -> None:
         self.stuck |= self.own
-        self.asker = self.asker or self.party
-        self.movers = self.movers or frozenset([self.party])
+        self.asker = self.asker or self.holder
+        self.movers = self.movers or frozenset([self.holder])
 
 
 @dataclass(eq=False, slots=True)
@@ -83,7 +83,7 @@ class ProgramWait:
     Attributes:
         what: For messages, up to the name of who is awaited.
         asker: Who waits.
-        stuck: The parties that release nothing as long as it waits.
+        stuck: The holders that release nothing as long as it waits.
         awaited: Tells who is still to do it.
     """
 
@@ -99,7 +99,7 @@ Obstacle = tuple[Callable[[Wait], bool], str]
 
 
 class ZoneLocks:
-    """All claims of one cell."""
+    """All requests of one cell."""
 
     def __init__(self) -> None:
         self._held: list[ZoneRequest] = []
@@ -109,34 +109,34 @@ class ZoneLocks:
 
     @property
     def held(self) -> list[ZoneRequest]:
-        """The claims that are granted, oldest first."""
+        """The requests that are granted, oldest first."""
         return list(self._held)
 
     @property
     def waiting(self) -> list[ZoneRequest]:
-        """The claims that wait, oldest first."""
+        """The requests that wait, oldest first."""
         return list(self._waiting)
 
     def holders(self, zone: str) -> list[ZoneHolder]:
         """Returns who holds a zone."""
-        return list(dict.fromkeys(claim.party for claim in self._held if zone in claim.zones))
+        return list(dict.fromkeys(request.holder for request in self._held if zone in request.zones))
 
     @contextmanager
-    def preparing(self, claim: ZoneRequest) -> Generator[None]:
-        """While this is entered, a claim is not judged yet, but ended as one that waits."""
-        self._prepared.append(claim)
+    def preparing(self, request: ZoneRequest) -> Generator[None]:
+        """While this is entered, a request is not judged yet, but ended as one that waits."""
+        self._prepared.append(request)
         try:
             yield
         finally:
-            self._prepared.remove(claim)
+            self._prepared.remove(request)
 
-    def request(self, claim: ZoneRequest) -> None:
-        """Enters a claim; it may be answered before this returns."""
-        self._waiting.append(claim)
+    def request(self, request: ZoneRequest) -> None:
+        """Enters a request; it may be answered before this returns."""
+        self._waiting.append(request)
         self.settle()
-        if not claim.patient and claim in self._waiting:
-            self._waiting.remove(claim)
-            claim.answer(ZoneOccupied(f"{claim.party.name} may not pass: {self._reason(claim)}"))
+        if not request.patient and request in self._waiting:
+            self._waiting.remove(request)
+            request.answer(ZoneOccupied(f"{request.holder.name} may not pass: {self._reason(request)}"))
 
     @contextmanager
     def pausing(self, pause: ProgramWait) -> Generator[None]:
@@ -152,44 +152,44 @@ class ZoneLocks:
         finally:
             self._pauses.remove(pause)
 
-    def take(self, claim: ZoneRequest) -> None:
-        """Grants a claim to who is in the zones already, whoever else holds them."""
-        self._held.append(claim)
+    def take(self, request: ZoneRequest) -> None:
+        """Grants a request to who is in the zones already, whoever else holds them."""
+        self._held.append(request)
         self.settle()
 
-    def release(self, claim: ZoneRequest) -> None:
-        """Gives back all zones of a claim, which is withdrawn if it waits."""
-        if claim in self._waiting:
-            self._waiting.remove(claim)
+    def release(self, request: ZoneRequest) -> None:
+        """Gives back all zones of a request, which is withdrawn if it waits."""
+        if request in self._waiting:
+            self._waiting.remove(request)
             self.settle()
         else:
-            self.keep([claim], frozenset())
+            self.keep([request], frozenset())
 
-    def keep(self, claims: Collection[ZoneRequest], zones: frozenset[str]) -> None:
-        """Gives back all that several claims hold but some zones. What is not held does not matter."""
-        for claim in [claim for claim in claims if claim in self._held]:
-            claim.zones &= zones
-            if not claim.zones:
-                self._held.remove(claim)
+    def keep(self, requests: Collection[ZoneRequest], zones: frozenset[str]) -> None:
+        """Gives back all that several requests hold but some zones. What is not held does not matter."""
+        for request in [request for request in requests if request in self._held]:
+            request.zones &= zones
+            if not request.zones:
+                self._held.remove(request)
 
         self.settle()
 
-    def fail(self, parties: Collection[ZoneHolder], error: DobotError) -> None:
-        """Ends the waiting of all that act for one of these parties."""
-        self._end(lambda claim: not claim.stuck.isdisjoint(parties), error)
+    def fail(self, holders: Collection[ZoneHolder], error: DobotError) -> None:
+        """Ends the waiting of all that act for one of these holders."""
+        self._end(lambda request: not request.stuck.isdisjoint(holders), error)
 
-    def interrupt(self, party: ZoneHolder, error: DobotError) -> None:
-        """Ends the waiting for what one party is to move by; not that of programs which act for it."""
-        self._end(lambda claim: party in claim.movers, error)
+    def interrupt(self, holder: ZoneHolder, error: DobotError) -> None:
+        """Ends the waiting for what one holder is to move by; not that of programs which act for it."""
+        self._end(lambda request: holder in request.movers, error)
 
     def stop(self, error: DobotError) -> None:
         """Ends all waiting."""
         self._end(lambda _: True, error)
 
     def settle(self) -> None:
-        """Answers all that can be answered; to be called when a party has failed or come to rest."""
+        """Answers all that can be answered; to be called when a holder has failed or come to rest."""
         while True:
-            found = next((claim for claim in self._waiting if self._free(claim) and self._next(claim)), None)
+            found = next((request for request in self._waiting if self._free(request) and self._next(request)), None)
             if found:
                 self._waiting.remove(found)
                 self._held.append(found)
@@ -200,46 +200,46 @@ class ZoneLocks:
             if refused is None:
                 return
 
-            claim, error = refused
-            self._waiting.remove(claim)
-            claim.answer(error)
+            request, error = refused
+            self._waiting.remove(request)
+            request.answer(error)
 
     def _end(self, concerned: Callable[[ZoneRequest], bool], error: DobotError) -> None:
-        """Ends the waiting of some claims."""
-        for claim in filter(concerned, (*self._waiting, *self._prepared)):
-            if claim in self._waiting:
-                self._waiting.remove(claim)
+        """Ends the waiting of some requests."""
+        for request in filter(concerned, (*self._waiting, *self._prepared)):
+            if request in self._waiting:
+                self._waiting.remove(request)
 
-            claim.answer(error)
+            request.answer(error)
 
         self.settle()
 
-    def _foreign(self, claim: ZoneRequest) -> Iterator[tuple[ZoneHolder, str]]:
-        """Who stands in the way of a claim, and in which zone; who is in a zone may move in it, even beside others.
+    def _foreign(self, request: ZoneRequest) -> Iterator[tuple[ZoneHolder, str]]:
+        """Who stands in the way of a request, and in which zone; who is in a zone may move in it, even beside others.
 
         To hold it is not enough: who only may be in a zone, beside another one who only may be there, could meet it.
         """
         for each in self._held:
-            if each.party not in claim.own:
-                for zone in sorted(each.zones & claim.zones - claim.party.inside):
-                    yield each.party, zone
+            if each.holder not in request.own:
+                for zone in sorted(each.zones & request.zones - request.holder.inside):
+                    yield each.holder, zone
 
-    def _free(self, claim: ZoneRequest) -> bool:
-        return next(self._foreign(claim), None) is None
+    def _free(self, request: ZoneRequest) -> bool:
+        return next(self._foreign(request), None) is None
 
-    def _next(self, claim: ZoneRequest) -> bool:
-        """Whether no earlier claim has a better right."""
-        return all(claim in self._behind(earlier) for earlier in self._before(claim))
+    def _next(self, request: ZoneRequest) -> bool:
+        """Whether no earlier request has a better right."""
+        return all(request in self._behind(earlier) for earlier in self._before(request))
 
-    def _before(self, claim: ZoneRequest) -> list[ZoneRequest]:
-        """The earlier claims on the same zones that still wait."""
-        earlier = self._waiting[: self._waiting.index(claim)]
-        return [each for each in earlier if not each.zones.isdisjoint(claim.zones)]
+    def _before(self, request: ZoneRequest) -> list[ZoneRequest]:
+        """The earlier requests on the same zones that still wait."""
+        earlier = self._waiting[: self._waiting.index(request)]
+        return [each for each in earlier if not each.zones.isdisjoint(request.zones)]
 
-    def _behind(self, claim: ZoneRequest) -> set[Wait]:
-        """All that a claim waits for, directly or not."""
+    def _behind(self, request: ZoneRequest) -> set[Wait]:
+        """All that a request waits for, directly or not."""
         found: set[Wait] = set()
-        todo: list[Wait] = [claim]
+        todo: list[Wait] = [request]
         while todo:
             each = todo.pop()
             ends_before = [self._held_up(obstacle) for obstacle, _ in self._obstacles(each)]
@@ -254,11 +254,11 @@ class ZoneLocks:
     def _obstacles(self, wait: Wait) -> Iterator[Obstacle]:
         """What keeps a wait from ending."""
         if isinstance(wait, ProgramWait):
-            for party in wait.awaited():
-                yield partial(keeps_away, party), f"{wait.what} {party.name}"
+            for holder in wait.awaited():
+                yield partial(keeps_away, holder), f"{wait.what} {holder.name}"
         else:
-            for party, zone in self._foreign(wait):
-                yield partial(keeps_in, party), f"for zone {zone}, which {party.name} holds"
+            for holder, zone in self._foreign(wait):
+                yield partial(keeps_in, holder), f"for zone {zone}, which {holder.name} holds"
 
     def _held_up(self, obstacle: Callable[[Wait], bool]) -> list[Wait]:
         """The waits that have to end before an obstacle goes."""
@@ -266,18 +266,21 @@ class ZoneLocks:
         return [wait for wait in waits if obstacle(wait)]
 
     def _hopeless(self) -> Iterator[tuple[ZoneRequest, DobotError]]:
-        """Claims that wait for somebody who has failed, for an arm that nobody moves any more, or for themselves."""
-        for claim in reversed(self._waiting):
-            for party, zone in self._foreign(claim):
-                if party.failure:
-                    failed = f"{party.name} has failed, and may still be in zone {zone}: {party.failure}"
-                    yield claim, ZoneOccupied(failed)
-                elif not party.moving() and claim.parked(party):
-                    yield claim, ZoneOccupied(f"{party.name} is in zone {zone}, and no program is left that moves it")
+        """Requests that wait for somebody who has failed, for an arm that nobody moves any more, or for themselves."""
+        for request in reversed(self._waiting):
+            for holder, zone in self._foreign(request):
+                if holder.failure:
+                    failed = f"{holder.name} has failed, and may still be in zone {zone}: {holder.failure}"
+                    yield request, ZoneOccupied(failed)
+                elif not holder.moving() and request.parked(holder):
+                    yield (
+                        request,
+                        ZoneOccupied(f"{holder.name} is in zone {zone}, and no program is left that moves it"),
+                    )
 
-            cycle = self._cycle(claim) if claim.patient else []
+            cycle = self._cycle(request) if request.patient else []
             if cycle:
-                yield claim, deadlock(cycle)
+                yield request, deadlock(cycle)
 
     def _cycle(self, start: Wait) -> list[str]:
         """The waits that lead from one back to itself, in words; empty if they do not."""
@@ -285,7 +288,7 @@ class ZoneLocks:
         seen: set[Wait] = set()
         while ways:
             each, words = ways.pop(0)
-            who = each.party if isinstance(each, ZoneRequest) else each.asker
+            who = each.holder if isinstance(each, ZoneRequest) else each.asker
             for obstacle, why in self._obstacles(each):
                 told = [*words, f"{who.name} waits {why}"]
                 if obstacle(start):
@@ -298,20 +301,20 @@ class ZoneLocks:
 
         return []
 
-    def _reason(self, claim: ZoneRequest) -> str:
-        """Why a claim has to wait, in words."""
-        held = [f"{party.name} holds zone {zone}" for party, zone in self._foreign(claim)]
-        return "; ".join(held) or f"others wait for {', '.join(sorted(claim.zones))}"
+    def _reason(self, request: ZoneRequest) -> str:
+        """Why a request has to wait, in words."""
+        held = [f"{holder.name} holds zone {zone}" for holder, zone in self._foreign(request)]
+        return "; ".join(held) or f"others wait for {', '.join(sorted(request.zones))}"
 
 
-def keeps_in(party: ZoneHolder, wait: Wait) -> bool:
-    """Whether a party that holds a zone leaves it only when a wait has ended."""
-    return party in wait.stuck and not party.moving()
+def keeps_in(holder: ZoneHolder, wait: Wait) -> bool:
+    """Whether a holder that holds a zone leaves it only when a wait has ended."""
+    return holder in wait.stuck and not holder.moving()
 
 
-def keeps_away(party: ZoneHolder, wait: Wait) -> bool:
-    """Whether a party does what is awaited of it only when a wait has ended."""
-    return party is wait.asker
+def keeps_away(holder: ZoneHolder, wait: Wait) -> bool:
+    """Whether a holder does what is awaited of it only when a wait has ended."""
+    return holder is wait.asker
 
 
 def deadlock(cycle: Collection[str]) -> ZoneDeadlock:

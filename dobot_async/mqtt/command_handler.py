@@ -145,16 +145,16 @@ class CommandHandler:
 
         return {"stopped": self._on.name}
 
-    async def _take_lease(self, session: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    async def _take_lease(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         seconds = seconds_of(given)
         holder = self._lease.holder
-        party = holder if holder and holder.name == session and not holder.gone else MqttSession(session)
-        await self._lease.take(party)
-        if party.timer:
-            party.timer.cancel()
+        session = holder if holder and holder.name == name and not holder.gone else MqttSession(name)
+        await self._lease.take(session)
+        if session.timer:
+            session.timer.cancel()
 
-        party.timer = asyncio.get_running_loop().call_later(seconds, self._expire, party)
-        return {"lease": session, "seconds": seconds}
+        session.timer = asyncio.get_running_loop().call_later(seconds, self._expire, session)
+        return {"lease": name, "seconds": seconds}
 
     async def _release_lease(self, session: str, given: Mapping[str, Any]) -> dict[str, Any]:
         only(given)
@@ -212,21 +212,21 @@ class CommandHandler:
 
         return False
 
-    def _expire(self, party: MqttSession) -> None:
+    def _expire(self, session: MqttSession) -> None:
         """A lease is over."""
-        party.leave()
-        for task in list(party.works):
+        session.leave()
+        for task in list(session.works):
             task.cancel()
 
-        self._start(self._lease.end(party), party.name, "end of the lease")
+        self._start(self._lease.end(session), session.name, "end of the lease")
 
     def _start(self, work: Coroutine[Any, Any, None], session: str, what: object) -> None:
         task = asyncio.create_task(work, name=f"dobot_async mqtt {what} of {session}")
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _tell(self, what: str, party: MqttSession, detail: str) -> None:
-        logger.info("%s: %s: %s: %s", self._on.name, party.name, what, detail)
+    def _tell(self, what: str, session: MqttSession, detail: str) -> None:
+        logger.info("%s: %s: %s: %s", self._on.name, session.name, what, detail)
         self._changed()
 
 
@@ -234,9 +234,9 @@ def keep(_party: MqttSession, _reason: str) -> None:
     """Nobody takes a lease from who has it, so nobody is cut off."""
 
 
-async def end_works(party: MqttSession) -> None:
+async def end_works(session: MqttSession) -> None:
     """End what a session has the arm do; when this returns the arm was stopped."""
-    for task in list(party.works):
+    for task in list(session.works):
         await cancel_and_join(task)
 
 

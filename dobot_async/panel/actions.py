@@ -35,7 +35,7 @@ def stop(call: PageRequest) -> Coroutine[Any, Any, Any]:
     if call.at:
         return call.at.stop(call.session)
 
-    return call.session.desk.stop_all(call.session)
+    return call.session.state.stop_all(call.session)
 
 
 def recover(call: PageRequest) -> Coroutine[Any, Any, Any]:

@@ -99,12 +99,12 @@ def preview(call: PageRequest) -> Coroutine[Any, Any, Any]:
     file, plane, size = call.given.text("file"), plane_of(call), size_of(call)
     tool = call.given.word("tool", TOOLS, "pen")
     call.given.end()
-    return call.session.desk.drawings.preview(call.station.view, file, plane, size, tool)
+    return call.session.state.drawings.preview(call.station.view, file, plane, size, tool)
 
 
 def draw(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Draw it."""
-    station, drawings = call.station, call.session.desk.drawings
+    station, drawings = call.station, call.session.state.drawings
     file, plane, size = call.given.text("file"), plane_of(call), size_of(call)
     tool = call.given.word("tool", TOOLS, "pen")
     options: dict[str, Any] = {

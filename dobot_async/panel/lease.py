@@ -53,11 +53,11 @@ class OperatorLease:
         self._changed = changed
         self._changing = asyncio.Lock()
 
-    async def take(self, party: Operator, *, takeover: bool = False) -> None:
+    async def take(self, operator: Operator, *, takeover: bool = False) -> None:
         """Return when somebody has it; raise Refusal if somebody else keeps it."""
         async with self._changing:
             holder = self.holder
-            if holder is party:
+            if holder is operator:
                 return
 
             if holder and not (takeover and holder.yields):
@@ -65,31 +65,31 @@ class OperatorLease:
                 raise PanelRefusal("lease", f"{holder.name} moves the arm{can}")
 
             if holder:
-                await self._release(holder, f"{party.name} takes over from {holder.name}")
+                await self._release(holder, f"{operator.name} takes over from {holder.name}")
 
-            if party.gone:
-                raise PanelRefusal("lease", f"{party.name} has gone")
+            if operator.gone:
+                raise PanelRefusal("lease", f"{operator.name} has gone")
 
             await self._begin()
-            if party.gone:
-                raise PanelRefusal("lease", f"{party.name} has gone")
+            if operator.gone:
+                raise PanelRefusal("lease", f"{operator.name} has gone")
 
-            self.holder = party
+            self.holder = operator
             self.freed.clear()
-            self._changed(f"{party.name} moves the arm from now on")
+            self._changed(f"{operator.name} moves the arm from now on")
 
-    async def end(self, party: Operator, why: str) -> None:
+    async def end(self, operator: Operator, why: str) -> None:
         """End the lease of somebody, if he has it."""
         async with self._changing:
-            if self.holder is party:
-                await self._release(party, why)
+            if self.holder is operator:
+                await self._release(operator, why)
 
-    def check(self, party: Operator) -> None:
+    def check(self, operator: Operator) -> None:
         """Raise Refusal if somebody does not have it."""
         if self.holder is None:
             raise PanelRefusal("lease", "take the lease of the arm first")
 
-        if self.holder is not party:
+        if self.holder is not operator:
             raise PanelRefusal("lease", f"{self.holder.name} moves the arm")
 
     async def _release(self, holder: Operator, why: str) -> None:

@@ -107,7 +107,7 @@ def step(call: PageRequest) -> Coroutine[Any, Any, Any]:
 
 def new_hold(call: PageRequest, press: int) -> HoldToRun:
     """Return a hold for a press that is new, and that comes from a hand that holds now."""
-    ticks = call.session.desk.ticks
+    ticks = call.session.state.ticks
     if not ticks.is_new(call.given.whole("tick", 0, 2**53)):
         raise PanelRefusal("late", "this press is older than 0.3 s: the line to this page is too slow")
 

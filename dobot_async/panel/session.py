@@ -36,7 +36,7 @@ class PageSession:
     """See the module; a `Party` of leases.
 
     Attributes:
-        desk: What it shares with others.
+        state: What it shares with others.
         role: What it may do.
         name: Who it is, for people.
         gone: Its connection has ended.
@@ -44,8 +44,8 @@ class PageSession:
         outlet: What waits to be sent.
     """
 
-    def __init__(self, desk: PanelState, role: Role, name: str) -> None:
-        self.desk = desk
+    def __init__(self, state: PanelState, role: Role, name: str) -> None:
+        self.state = state
         self.role = role
         self.name = self._first_name = name
         self.gone = False
@@ -96,7 +96,7 @@ class PageSession:
             return
 
         self.gone = True
-        stations = self.desk.stations.values()
+        stations = self.state.stations.values()
         held = [station for station in stations if station.lease.holder is self]
         for station in held:  # at once: the rest may have to wait for others
             station.let_go("left")
@@ -104,7 +104,7 @@ class PageSession:
 
         await asyncio.gather(*(station.lease.end(self, "its page has gone") for station in stations))
         await asyncio.gather(*(cancel_and_join(task) for task in list(self._tasks)))
-        self.desk.leave(self)
+        self.state.leave(self)
         self.outlet.close()
 
     def _do(self, number: int | None, message: dict[str, Any]) -> None:
@@ -118,7 +118,7 @@ class PageSession:
             raise PanelRefusal("role", "viewers look on, and stop; they do not move the arm")
 
         named = "arm" in message
-        station = self.desk.station(message.pop("arm")) if named else None
+        station = self.state.station(message.pop("arm")) if named else None
         if station is None and action.arm:
             raise PanelRefusal("wrong", "say which arm")
 

@@ -56,12 +56,12 @@ class Web:
     """See the module.
 
     Args:
-        desk: What is behind it.
+        state: What is behind it.
         access: Who may come in.
     """
 
-    def __init__(self, desk: PanelState, access: Access) -> None:
-        self._desk = desk
+    def __init__(self, state: PanelState, access: Access) -> None:
+        self._state = state
         self._access = access
         self._pages = StaticFiles(STATIC)
         now = asyncio.get_running_loop().time
@@ -147,7 +147,7 @@ class Web:
         return await handler(request)
 
     def _role(self, request: web.Request) -> Role:
-        """Return what who asks may do; raise TurnedAway for strangers."""
+        """Return what who asks may do; raise AccessDenied for who is not known."""
         role = self._access.role_of_cookie(request.cookies.get(self._access.cookie_name, ""))
         if role is None and request.path == METRICS:  # Prometheus has no cookies
             role = self._access.role_of_token(request.headers.get("Authorization", "").removeprefix("Bearer "))
@@ -185,12 +185,12 @@ class Web:
 
     async def _metrics(self, _request: web.Request) -> web.Response:
         """Give out the figures of the arms; needs the extra `metrics`."""
-        text = await panel_metrics(self._desk)
+        text = await panel_metrics(self._state)
         return web.Response(body=text, headers={"Content-Type": CONTENT_TYPE})
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         """Serve a page until it goes, or does not answer any more."""
-        session = self._desk.join(self._role(request), request.remote or "?")
+        session = self._state.join(self._role(request), request.remote or "?")
         socket = web.WebSocketResponse(heartbeat=PINGS, max_msg_size=LARGEST_MESSAGE, compress=False, timeout=1.0)
         socket.headers.update(HEADERS)
         pumping: asyncio.Task[None] | None = None
@@ -216,18 +216,18 @@ class Web:
     async def _upload(self, request: web.Request) -> web.Response:
         """Take a file to be drawn."""
         self._check_operator(request)
-        self._desk.station(request.query.get("arm"))
+        self._state.station(request.query.get("arm"))
         name, mode = printable(request.query.get("name", ""), 100), request.query.get("mode", "outline")
         if mode not in MODES:
             raise ValueError(f"mode must be one of {', '.join(MODES)}")
 
         data = await self._body(request, LARGEST_FILE)
-        return as_json(await self._desk.drawings.add(data, name, mode))
+        return as_json(await self._state.drawings.add(data, name, mode))
 
     async def _load(self, request: web.Request) -> web.Response:
         """Take a recording, which the page loads by `teach_load`."""
         self._check_operator(request)
-        station = self._desk.station(request.match_info["name"])
+        station = self._state.station(request.match_info["name"])
         data = await self._body(request, LARGEST_RECORDING)
         return as_json(await station.taught.add(data, printable(request.query.get("name", ""), 100)))
 
@@ -237,7 +237,7 @@ class Web:
         if suffix not in {"json", "playback"}:
             raise web.HTTPNotFound
 
-        station = self._desk.station(name)
+        station = self._state.station(name)
         text = station.taught.text(suffix)
         headers = {"Content-Disposition": f'attachment; filename="{safe(name)}.{suffix}"'}
         return web.Response(body=text.encode(), content_type="application/octet-stream", headers=headers)

@@ -98,8 +98,8 @@ FAMILY_TRAITS: Mapping[type, FamilyTraits] = {
 
 def traits_of(kind: type) -> FamilyTraits:
     """Return what is known of an arm's class; raise ValueError for one of another family."""
-    for family, manners in FAMILY_TRAITS.items():
+    for family, traits in FAMILY_TRAITS.items():
         if issubclass(kind, family):
-            return manners
+            return traits
 
     raise ValueError(f"nothing is known of how fast a {kind.__name__} may go")

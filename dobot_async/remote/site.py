@@ -33,7 +33,7 @@ class RemoteArm:
     Attributes:
         name: What it is called.
         arm: The arm.
-        manners: Its family's.
+        traits: Its family's.
         fastest: Percent of its speed, at the most.
         workspace: Where its tool may be; None is wherever it reaches.
         base: Where it stands in its cell, None for one that stands in none.
@@ -42,7 +42,7 @@ class RemoteArm:
 
     name: str
     arm: Arm
-    manners: FamilyTraits
+    traits: FamilyTraits
     fastest: float
     workspace: Workspace | None
     base: BaseFrame | None

@@ -336,7 +336,7 @@ async def test_an_arm_that_another_program_uses_is_left_alone(
 ) -> None:
     async with opened(module.url) as transport:
         if not of_ours:
-            monkeypatch.setattr(opening, "claim", lambda _: ble_claim.DeviceLock(None))
+            monkeypatch.setattr(opening, "lock_device", lambda _: ble_claim.DeviceLock(None))
 
         with pytest.raises(ConnectFailed, match="else on this computer uses D8:B0:4C:B3:38:68; end it first"):
             await open_transport("ble:", arm="magician")

@@ -1,4 +1,4 @@
-"""The air between a computer and a simulated arm's BLE module, in connection events; and the module's serial port.
+"""A BLE connection's link layer between a computer and the simulated module, by connection events; and the serial port.
 
     computer --> packets that wait --> connection event --> module --> 115200 baud --> arm
              <-- packets that wait <--    (each interval)    <-- module <--             <--
@@ -144,7 +144,7 @@ class Uart:
 
 
 class SerialBridge:
-    """The serial line of one connection to the arm: what has reached the module goes on, even if the air is gone.
+    """The serial line of one connection to the arm: what reached the module is sent even if the connection is gone.
 
     Args:
         deliver: Takes what has reached the arm.

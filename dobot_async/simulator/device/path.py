@@ -1,12 +1,12 @@
-"""Legs: ways with their speed, in joints. Knows no family and no clock.
+"""Segments: ways with their speed, in joints. Knows no family and no clock.
 
     joints ---joint_leg--> Leg --.
     Curve ----curve_leg--> Leg --+--travel--> Activity
-    jump(...) -----------> Legs -'
+    jump(...) -----------> Segments -'
 
 A joint vector has any length; kinematics come as a `JointSolver`. The end of a curve has to be within reach, or
-planning raises the solver's fault. On the way the reach is looked at every few mm and degrees, and a leg that leaves it
-ends at that place, with the fault of the way (Dobot's codes: that of the plan and 0x10).
+planning raises the solver's fault. The reach is checked every few mm and degrees, and a segment that
+leaves it ends at that place, with the fault of the way (Dobot's codes: that of the plan and 0x10).
 """
 
 from __future__ import annotations
@@ -205,7 +205,7 @@ def jump(
     every: float = EVERY,
     underway: int = UNDERWAY,
 ) -> list[Segment]:
-    """Returns the legs up, across and down, or those up to the one that leaves the reach.
+    """Returns the segments up, across and down, or those up to the one that leaves the reach.
 
     The way across is `height` above the higher end, but not above `ceiling` (zLimit).
 
@@ -249,39 +249,39 @@ def jump(
         except DeviceFault as fault:
             return joint_segment(joints, joints, across, fault=DeviceFault(fault.code + underway))
 
-    legs = [line(origin, above_origin, start, vertical)]
+    segments = [line(origin, above_origin, start, vertical)]
 
     def down(joints: Vector) -> Segment:
         return line(above_target, target, joints, vertical)
 
     for following in (sideways, down):
-        if legs[-1].fault:
+        if segments[-1].fault:
             break
 
-        legs.append(following(legs[-1].end))
+        segments.append(following(segments[-1].end))
 
-    return legs
+    return segments
 
 
-def travel(legs: Sequence[Segment], end: Callable[[], None] = lambda: None) -> Activity:
-    """Returns the activity of going along some legs, one after the other.
+def travel(segments: Sequence[Segment], end: Callable[[], None] = lambda: None) -> Activity:
+    """Returns the activity of going along some segments, one after the other.
 
     Args:
-        legs: At least one; a fault may only be in the last.
+        segments: At least one; a fault may only be in the last.
         end: Called when all is done without a fault.
     """
-    ends = list(accumulate(leg.duration for leg in legs))
+    ends = list(accumulate(segment.duration for segment in segments))
 
     def at(elapsed: float) -> Vector:
         number = bisect_right(ends, elapsed)
-        if number == len(legs):
-            return legs[-1].end
+        if number == len(segments):
+            return segments[-1].end
 
-        return legs[number].at(elapsed - (ends[number - 1] if number else 0.0))
+        return segments[number].at(elapsed - (ends[number - 1] if number else 0.0))
 
     def finish() -> None:
-        if legs[-1].fault:
-            raise DeviceFault(legs[-1].fault.code)
+        if segments[-1].fault:
+            raise DeviceFault(segments[-1].fault.code)
 
         end()
 

@@ -40,11 +40,11 @@ def jog(state: State, reach: Reach, value: c.JOGCmd, joints: Vector) -> Activity
         return rail_jog(state, direction, factors, joints) if value.is_joint else Activity()
 
     if value.is_joint:
-        leg = joint_jog(state, axis, direction, factors, joints[:4])
+        segment = joint_jog(state, axis, direction, factors, joints[:4])
     else:
-        leg = tool_jog(state, reach, axis, direction, factors, joints[:4])
+        segment = tool_jog(state, reach, axis, direction, factors, joints[:4])
 
-    return along([leg], standing(joints[4]))
+    return along([segment], standing(joints[4]))
 
 
 def margins(limits: JointLimits, joints: Vector) -> dict[int, float]:
@@ -83,12 +83,12 @@ def tool_jog(
     pace = SpeedLimits(
         (limits.velocity[axis], limits.velocity[3]), (limits.acceleration[axis], limits.acceleration[3])
     ).scaled(*factors)
-    leg = curve_segment(LineSegment(start, end), joints, reach, pace, must_arrive=False)
-    if leg.fault and leg.fault.code == LIMIT_UNDERWAY:
-        left = margins(state.limits, leg.end)
-        return replace(leg, fault=DeviceFault(min(left, key=left.__getitem__)))
+    segment = curve_segment(LineSegment(start, end), joints, reach, pace, must_arrive=False)
+    if segment.fault and segment.fault.code == LIMIT_UNDERWAY:
+        left = margins(state.limits, segment.end)
+        return replace(segment, fault=DeviceFault(min(left, key=left.__getitem__)))
 
-    return leg
+    return segment
 
 
 def rail_jog(state: State, direction: int, factors: tuple[float, float], joints: Vector) -> Activity:

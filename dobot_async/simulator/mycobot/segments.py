@@ -64,11 +64,11 @@ class SegmentPlanner:
         if not straight:
             return self.to_joints(start, found, speed)
 
-        leg = self.line(start, point, speed)
-        if leg.stop < 1.0:
+        segment = self.line(start, point, speed)
+        if segment.stop < 1.0:
             raise DeviceFault(NO_LINE)
 
-        return leg
+        return segment
 
     def elbow(self, start: Vector, angle: float, speed: float) -> Segment:
         """The elbow of seven joints to an angle, with the flange where it is at the end."""

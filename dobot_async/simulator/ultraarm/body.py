@@ -177,11 +177,11 @@ def move_coords(registers: Registers, joints: Vector, value: c.CoordsMove) -> Ac
 
     own = plus(target, tuple(-each for each in registers.origin))
     pace = SpeedLimits((registers.speed,) * 2, (registers.acceleration,) * 2)
-    leg = curve_segment(LineSegment(forward(joints), own), joints, Geometry(), pace)
-    if leg.fault:
-        raise leg.fault
+    segment = curve_segment(LineSegment(forward(joints), own), joints, Geometry(), pace)
+    if segment.fault:
+        raise segment.fault
 
-    return travel([leg])
+    return travel([segment])
 
 
 def move_joints(registers: Registers, joints: Vector, value: c.JointsMove) -> Activity:

@@ -1,7 +1,7 @@
 """One program at a time: who connects to an arm over BLE claims it on this computer before.
 
 BlueZ lets every program into a connection that one of them has made: each would get the other's answers, and the first
-to disconnect would cut the other off. A claim is a name that only one socket on a computer can have, and that the
+to disconnect would cut the other off. A lock is a name that only one socket on a computer can have, and that the
 kernel frees when its program ends, however it ends. Only Linux has such names, and only BlueZ needs them.
 """
 

@@ -57,7 +57,7 @@ class Opening:
         self._pace = pace
         self._adapter = adapter
         self._tried: set[str] = set()
-        self._claim = DeviceLock(None)
+        self._lock = DeviceLock(None)
 
     async def transport(self) -> BleTransport:
         """Returns a connection, or raises ConnectFailed."""
@@ -74,7 +74,7 @@ class Opening:
                 if not problem.passing or pause is None:
                     raise ConnectFailed(f"cannot open {self._url}: {problem.text}") from error
             except BaseException:
-                self._claim.drop()  # the arm may have been found just now, and not be connected to yet
+                self._lock.drop()  # the arm may have been found just now, and not be connected to yet
                 raise
 
             await asyncio.sleep(pause)
@@ -112,7 +112,7 @@ class Opening:
     def _takes(self, seen: SeenDevice) -> bool:
         """Claims a device if it is the one that is wanted, and free."""
         taken = lock_device(seen.device.address) if self._wanted.fits(seen) else None
-        self._claim = taken or self._claim
+        self._lock = taken or self._lock
         return taken is not None
 
     def _nobody(self, others: dict[str, str], in_use: list[SeenDevice]) -> str:
@@ -135,7 +135,7 @@ class Opening:
             given["adapter"] = self._adapter
 
         url = f"ble://{quote(seen.device.address, safe=':')}" + (f"?{urlencode(given)}" if given else "")
-        transport = BleTransport(seen, url=url, pace=self._pace, adapter=self._adapter, lock_device=self._claim)
+        transport = BleTransport(seen, url=url, pace=self._pace, adapter=self._adapter, lock=self._lock)
         try:
             await transport.connect()
         except BaseException:
