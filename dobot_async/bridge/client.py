@@ -23,7 +23,7 @@ from dobot_async._core.link.admission import Admission
 from dobot_async._core.protocol.contract import Frame
 from dobot_async.arms.bridge_adapter import BridgeAdapter, ClientWatch, RequestKind
 from dobot_async.bridge.limits import Allowance, Limits
-from dobot_async.bridge.requests import ClientRequest, RequestHandler, RequestRefused
+from dobot_async.bridge.requests import ClientRequest, Refused, RequestHandler
 from dobot_async.errors import DobotError
 
 __all__ = ["Client"]
@@ -150,7 +150,7 @@ class Client(Generic[F]):
     def sending(self, request: ClientRequest[F]) -> None:
         """A read is sent now: what is repeated from here on is asked anew."""
         if self.gone:
-            raise RequestRefused("the client has gone")
+            raise Refused("the client has gone")
 
         self.end_turn(request)
         self._forget(request)
@@ -284,9 +284,9 @@ class Client(Generic[F]):
         """Has a request answered, and hands over the answer."""
         try:
             reply = await self._handler.answer(self, request)
-        except (RequestRefused, DobotError) as error:
+        except (Refused, DobotError) as error:
             self._complain(self._family.name(request.frame), str(error))
-            self._answer(request, self._family.refusal(str(error)) if isinstance(error, RequestRefused) else b"")
+            self._answer(request, self._family.refusal(str(error)) if isinstance(error, Refused) else b"")
             if self._family.in_order and isinstance(error, DobotError):
                 self._drop()
         else:

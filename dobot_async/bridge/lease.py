@@ -9,7 +9,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Generic, Protocol, TypeVar
 
-from dobot_async.bridge.requests import RequestRefused
+from dobot_async.bridge.requests import Refused
 
 __all__ = ["Holder", "Lease"]
 
@@ -67,11 +67,11 @@ class Lease(Generic[H]):
                 return
 
             if client.gone:
-                raise RequestRefused("the client has gone")
+                raise Refused("the client has gone")
 
             if holder and not holder.gone:
                 if not self._takeover:
-                    raise RequestRefused(f"{holder.name} moves the arm")
+                    raise Refused(f"{holder.name} moves the arm")
 
                 self._cut(holder, f"{client.name} takes over")
 

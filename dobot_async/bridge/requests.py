@@ -11,12 +11,12 @@ from dobot_async.arms.bridge_adapter import RequestKind
 if TYPE_CHECKING:
     from dobot_async.bridge.client import Client
 
-__all__ = ["ClientRequest", "RequestHandler", "RequestRefused"]
+__all__ = ["ClientRequest", "Refused", "RequestHandler"]
 
 F = TypeVar("F", bound=Frame)
 
 
-class RequestRefused(Exception):
+class Refused(Exception):
     """A request is not passed on; the message says why. The client hears it where its protocol has a word for it."""
 
 

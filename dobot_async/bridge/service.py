@@ -33,7 +33,7 @@ from dobot_async.bridge.client import Client
 from dobot_async.bridge.lease import Lease
 from dobot_async.bridge.limits import Allowance, Limits
 from dobot_async.bridge.line import ArmLink
-from dobot_async.bridge.requests import ClientRequest, RequestRefused
+from dobot_async.bridge.requests import ClientRequest, Refused
 from dobot_async.bridge.standstill import Standstill
 from dobot_async.errors import ProtocolError, ReplyTimeout
 
@@ -182,12 +182,12 @@ class Bridge(Generic[F]):
     async def answer(self, client: Client[F], request: ClientRequest[F]) -> F | None:
         """Returns the arm's reply; raises Refused, or DobotError if there should be one."""
         if self.family.subject(request.frame) in self._denied:
-            raise RequestRefused("it is denied here")
+            raise Refused("it is denied here")
 
         try:
             self.family.check(request.frame)
         except ProtocolError as error:
-            raise RequestRefused(str(error)) from None
+            raise Refused(str(error)) from None
 
         try:
             return await self._pass_on(client, request)
@@ -270,10 +270,10 @@ class Bridge(Generic[F]):
 
         def ready() -> None:
             if client.gone or self._lease.holder is not client:
-                raise RequestRefused("the lease has ended")
+                raise Refused("the lease has ended")
 
             if request.stops != self.stops:
-                raise RequestRefused("the arm was stopped before it was sent")
+                raise Refused("the arm was stopped before it was sent")
 
             client.end_turn(request)
             client.watch.sent(frame)

@@ -24,7 +24,7 @@ from typing import Any, cast
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async._core.util.text import printable
 from dobot_async.bridge.lease import Lease
-from dobot_async.bridge.requests import RequestRefused
+from dobot_async.bridge.requests import Refused
 from dobot_async.errors import DobotError
 from dobot_async.mqtt.topics import SESSION
 from dobot_async.remote import RemoteArm, Works, parse_action
@@ -169,7 +169,7 @@ class CommandHandler:
         holder = self._lease.holder
         if holder is None or holder.gone or holder.name != session:
             who = f"{holder.name} has" if holder else "nobody has"
-            raise RequestRefused(f"take the lease first: {who} it")
+            raise Refused(f"take the lease first: {who} it")
 
         task = asyncio.current_task()
         assert task
@@ -183,7 +183,7 @@ class CommandHandler:
         """Do a command, and say what became of it."""
         try:
             told = {"id": key, "ok": True, "value": await work}
-        except (DobotError, ValueError, TypeError, ImportError, RequestRefused) as error:
+        except (DobotError, ValueError, TypeError, ImportError, Refused) as error:
             told = {"id": key, "ok": False, "error": told_of(error)}
         except asyncio.CancelledError:
             ended = {"kind": "MotionStopped", "text": "the lease has ended, and the arm was told to stop"}
