@@ -28,7 +28,7 @@ from typing import Any
 
 from report import BAUD, BITS
 
-from dobot_async.endpoints.line_rate import RateLimited, Wired
+from dobot_async.endpoints.line_rate import RateLimited, RateLimitedPeer
 from dobot_async.endpoints.pty import on_pty
 from dobot_async.mycobot import commands as cobot
 from dobot_async.simulator import MyCobotQuirks, Simulation, simulate
@@ -154,7 +154,7 @@ class Woken(selectors.SelectSelector):
 class Listener:
     """A client of an `Ear`."""
 
-    line: Wired[Any]
+    line: RateLimitedPeer[Any]
     note: Callable[[bytes], None]
 
     def send(self, data: bytes) -> None:

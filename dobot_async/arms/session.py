@@ -15,7 +15,7 @@ from dobot_async._core.util.arguments import check_choice, check_duration, check
 from dobot_async._core.util.tasks import Cleanup, run_shielded
 from dobot_async._core.util.urls import hidden
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTimeout
-from dobot_async.traces.recorder import Recording, recorded
+from dobot_async.traces.recorder import RecordSettings, recorded
 from dobot_async.transports import open_transport
 
 __all__ = ["arm_session", "check_options", "open_in_time", "run_owned"]
@@ -76,7 +76,7 @@ async def arm_session(
     build: Callable[[Transport, str], S],
     *,
     stop_on_error: bool,
-    recording: Recording | None = None,
+    recording: RecordSettings | None = None,
 ) -> AsyncGenerator[S]:
     """Connect to an arm, hold it for the length of a block, and leave it.
 

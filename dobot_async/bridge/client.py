@@ -22,8 +22,8 @@ from typing import Generic, TypeVar
 from dobot_async._core.link.admission import Admission
 from dobot_async._core.protocol.contract import Frame
 from dobot_async.arms.bridge_adapter import BridgeAdapter, ClientWatch, RequestKind
-from dobot_async.bridge.desk import ClientRequest, Refused, RequestHandler
 from dobot_async.bridge.limits import Allowance, Limits
+from dobot_async.bridge.requests import ClientRequest, Refused, RequestHandler
 from dobot_async.errors import DobotError
 
 __all__ = ["Client"]
@@ -53,7 +53,7 @@ class Client(Generic[F]):
 
     def __init__(
         self,
-        desk: RequestHandler[F],
+        handler: RequestHandler[F],
         family: BridgeAdapter[F],
         deliver: Callable[[bytes], None],
         hang_up: Callable[[], None],
@@ -69,7 +69,7 @@ class Client(Generic[F]):
         self.ordered = ordered
         self.watch: ClientWatch[F] = family.watch()
         self.reads = Admission(ON_THE_LINE)
-        self._desk = desk
+        self._handler = handler
         self._family = family
         self._deliver = deliver
         self._hang_up = hang_up
@@ -209,12 +209,12 @@ class Client(Generic[F]):
             self._junk = 0 if frames else self._junk + len(piece)
             self._sort(frames)
             if self._junk > self._limits.junk:
-                self._desk.cut(self, f"{self._junk} bytes without a request among them")
+                self._handler.cut(self, f"{self._junk} bytes without a request among them")
 
     def _sort(self, frames: list[F]) -> None:
         """Lets requests wait; not what stops the arm."""
         for frame in frames:
-            request = ClientRequest(frame, self._family.kind(frame), self._desk.stops)
+            request = ClientRequest(frame, self._family.kind(frame), self._handler.stops)
             if request.kind is RequestKind.READ:
                 self._ask(request)
                 continue
@@ -283,7 +283,7 @@ class Client(Generic[F]):
     async def _serve(self, request: ClientRequest[F]) -> None:
         """Has a request answered, and hands over the answer."""
         try:
-            reply = await self._desk.answer(self, request)
+            reply = await self._handler.answer(self, request)
         except (Refused, DobotError) as error:
             self._complain(self._family.name(request.frame), str(error))
             self._answer(request, self._family.refusal(str(error)) if isinstance(error, Refused) else b"")
@@ -325,9 +325,9 @@ class Client(Generic[F]):
         now = self._loop.time()
         if not self.gone and ((name, reason) != self._complaint or now > self._complained + AGAIN):
             self._complaint, self._complained = (name, reason), now
-            self._desk.refused(self, name, reason)
+            self._handler.refused(self, name, reason)
 
     def _ended(self, work: asyncio.Task[None]) -> None:
         """A bug that ends the work must not leave a client that waits for ever."""
         if not work.cancelled() and (error := work.exception()):
-            self._desk.cut(self, f"{type(error).__name__}: {error}")
+            self._handler.cut(self, f"{type(error).__name__}: {error}")

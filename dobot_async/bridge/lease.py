@@ -9,7 +9,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Generic, Protocol, TypeVar
 
-from dobot_async.bridge.desk import Refused
+from dobot_async.bridge.requests import Refused
 
 __all__ = ["Holder", "Lease"]
 

@@ -30,10 +30,10 @@ from dobot_async._core.util.events import Events
 from dobot_async._core.util.text import printable
 from dobot_async.arms.bridge_adapter import BridgeAdapter, RequestKind
 from dobot_async.bridge.client import Client
-from dobot_async.bridge.desk import ClientRequest, Refused
 from dobot_async.bridge.lease import Lease
 from dobot_async.bridge.limits import Allowance, Limits
 from dobot_async.bridge.line import ArmLink
+from dobot_async.bridge.requests import ClientRequest, Refused
 from dobot_async.bridge.standstill import Standstill
 from dobot_async.errors import ProtocolError, ReplyTimeout
 
@@ -146,7 +146,7 @@ class Bridge(Generic[F]):
         hold: Callable[[bool], None] = lambda _: None,
         name: str = "",
     ) -> Client[F]:
-        """Called by a door: somebody was let in."""
+        """Called by a listener: somebody was let in."""
         client = Client(self, self.family, deliver, hang_up, hold=hold, name=name, ordered=ordered, limits=self._limits)
         self._clients.add(client)
         if self._ended or len(self._clients) > self._limits.clients:
@@ -158,7 +158,7 @@ class Bridge(Generic[F]):
         return client
 
     def leave(self, client: Client[F]) -> None:
-        """Called by a door: a client has gone."""
+        """Called by a listener: a client has gone."""
         if client.left:
             return
 

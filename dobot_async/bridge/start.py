@@ -1,4 +1,4 @@
-"""Starts a bridge: the link to the arm first, then the doors; ends it in the other order."""
+"""Starts a bridge: the link to the arm first, then the listeners; ends it in the other order."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.contract import Frame
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.arms.bridge_adapter import BridgeAdapter
-from dobot_async.bridge.doors import Listeners, open_doors
 from dobot_async.bridge.families import family_of
 from dobot_async.bridge.limits import Limits
+from dobot_async.bridge.listeners import Listeners, open_listeners
 from dobot_async.bridge.service import Bridge
 from dobot_async.errors import ConnectFailed, DobotError
 
@@ -67,8 +67,8 @@ async def bridge(
         raise ValueError(f'expected deny to be of {", ".join(known.denials)}, and on_vanish "stop" or "leave"')
 
     limits = limits or Limits()
-    doors = Listeners.of([listen] if isinstance(listen, str) else listen, token, certificate, key, origins)
-    if known.in_order and any(place.scheme == "udp" for place in doors.places):
+    listeners = Listeners.of([listen] if isinstance(listen, str) else listen, token, certificate, key, origins)
+    if known.in_order and any(place.scheme == "udp" for place in listeners.places):
         raise ValueError(
             f"{family} cannot be bridged to udp: nothing but their order tells whose its answers are, and datagrams "
             "have none; listen at tcp, ws, zenoh or pty"
@@ -86,8 +86,8 @@ async def bridge(
         )
         stack.push_async_callback(lambda: run_shielded(running.aclose()))
         await greet(running.link, known, timeout)
-        running.urls = await open_doors(doors, running, stack, running.turned_away)
-        running.token = doors.token
+        running.urls = await open_listeners(listeners, running, stack, running.turned_away)
+        running.token = listeners.token
         stack.callback(running.end)
         yield running
 

@@ -1,4 +1,4 @@
-"""The Zenoh door: an arm under a name, found by its liveliness token; see `dobot_async.transports.zenoh.session`.
+"""The Zenoh listener: an arm under a name, found by its liveliness token; see `dobot_async.transports.zenoh.session`.
 
     token of a client + its query --> let in --> messages --> Host.client(...).send
     its token goes                --> Host.leave, as if a line were cut
@@ -50,10 +50,10 @@ async def on_zenoh(bridge: Bridge[Any], stack: AsyncExitStack, url: SplitResult)
     """Serves an arm on Zenoh until the stack is closed; returns the URL for clients on this computer."""
     place = ZenohConfig.of(url, serving=True)
     place = replace(place, listen=tuple(map(with_port, place.listen)))
-    door = Door(bridge, place)
-    stack.push_async_callback(door.aclose)
-    await door.open()
-    telemetry = Telemetry(bridge, door.session, door.keys)
+    listener = ZenohListener(bridge, place)
+    stack.push_async_callback(listener.aclose)
+    await listener.open()
+    telemetry = Telemetry(bridge, listener.session, listener.keys)
     stack.push_async_callback(telemetry.aclose)
     telemetry.start()
     return address(place.name, connect=tuple(map(reachable, place.listen or place.connect)))
@@ -78,7 +78,7 @@ def reachable(endpoint: str) -> str:
     return endpoint
 
 
-class Door:
+class ZenohListener:
     """Lets clients in.
 
     Attributes:
@@ -93,7 +93,7 @@ class Door:
         self.bridge = bridge
         self._name = place.name
         self._present: dict[str, None] = {}
-        self._guests: dict[str, Guest] = {}
+        self._connections: dict[str, ZenohConnection] = {}
         self._leaving: set[asyncio.Task[None]] = set()
         self._told = Allowance(STRANGERS, asyncio.get_running_loop().time)
         self._token: zenoh.LivelinessToken | None = None
@@ -124,8 +124,8 @@ class Door:
     async def aclose(self) -> None:
         """Tells all clients, takes back the name, and ends the session; takes a few seconds at most."""
         self.session.crossing.close()
-        for guest in list(self._guests.values()):
-            self.leave(guest, "the arm is not served any more")
+        for connection in list(self._connections.values()):
+            self.leave(connection, "the arm is not served any more")
 
         await run_shielded(self._end())
 
@@ -133,19 +133,21 @@ class Door:
         """Returns the way to a client."""
         return self.session.way(f"{self.keys.link}/{name}/down", waits=waits)
 
-    def cut(self, guest: Guest, why: str) -> None:
+    def cut(self, connection: ZenohConnection, why: str) -> None:
         """Ends the connection of a client that does what it must not."""
-        if self._guests.get(guest.name) is guest:
-            self.bridge.cut(guest.peer, why)
-            self.leave(guest, why)
+        if self._connections.get(connection.name) is connection:
+            self.bridge.cut(connection.peer, why)
+            self.leave(connection, why)
 
-    def leave(self, guest: Guest, why: str) -> None:
+    def leave(self, connection: ZenohConnection, why: str) -> None:
         """Ends the connection of a client, as far as there is one."""
-        if self._guests.get(guest.name) is guest:
-            del self._guests[guest.name]
-            self.bridge.leave(guest.peer)
-            guest.outbox.end(why)
-            leaving = asyncio.create_task(guest.outbox.aclose(), name=f"dobot_async zenoh farewell {guest.name}")
+        if self._connections.get(connection.name) is connection:
+            del self._connections[connection.name]
+            self.bridge.leave(connection.peer)
+            connection.outbox.end(why)
+            leaving = asyncio.create_task(
+                connection.outbox.aclose(), name=f"dobot_async zenoh farewell {connection.name}"
+            )
             self._leaving.add(leaving)
             leaving.add_done_callback(self._leaving.discard)
 
@@ -176,7 +178,7 @@ class Door:
     def _weigh(self, message: tuple[str, bytes]) -> tuple[str, int]:
         """Whose share of the way in a message takes: strangers, who may call themselves anything, have one together."""
         name, data = message
-        return name if name in self._guests else "", len(data)
+        return name if name in self._connections else "", len(data)
 
     def _notice(self, change: tuple[str, bool]) -> None:
         """A client's token has come or gone."""
@@ -184,12 +186,12 @@ class Door:
         if present and CHUNK.fullmatch(name):
             self._present[name] = None
             if len(self._present) > PRESENT:
-                del self._present[next(each for each in self._present if each not in self._guests)]
+                del self._present[next(each for each in self._present if each not in self._connections)]
         elif not present:
             self._present.pop(name, None)
-            guest = self._guests.get(name)
-            if guest:
-                self.leave(guest, "its token has gone")
+            connection = self._connections.get(name)
+            if connection:
+                self.leave(connection, "its token has gone")
 
     def _asked(self, query: zenoh.Query) -> None:
         """Somebody wants to be let in; asks again if the answer does not arrive."""
@@ -203,8 +205,8 @@ class Door:
         elif name not in self._present:
             query.reply_err(b"its liveliness token has not been seen")
         else:
-            if name not in self._guests:
-                self._guests[name] = Guest(self, name, f"zenoh:{given}")
+            if name not in self._connections:
+                self._connections[name] = ZenohConnection(self, name, f"zenoh:{given}")
 
             query.reply(query.key_expr, b"")
 
@@ -214,9 +216,9 @@ class Door:
         A name with a wildcard is not answered: it would be all clients at once.
         """
         name, data = message
-        guest = self._guests.get(name)
-        if guest:
-            guest.send(data)
+        connection = self._connections.get(name)
+        if connection:
+            connection.send(data)
         elif CHUNK.fullmatch(name) and self._may_tell():
             with suppress(library().ZError):
                 self.way(name, waits=False)(Numbered().pack(b"its connection has ended", END))
@@ -230,7 +232,7 @@ class Door:
         return True
 
 
-class Guest:
+class ZenohConnection:
     """A client that was let in.
 
     Attributes:
@@ -239,32 +241,32 @@ class Guest:
         peer: What the bridge keeps of it.
     """
 
-    def __init__(self, door: Door, name: str, shown: str) -> None:
+    def __init__(self, listener: ZenohListener, name: str, shown: str) -> None:
         self.name = name
-        self.outbox = SendQueue(door.way(name, waits=True), partial(door.cut, self), name)
-        self._door = door
+        self.outbox = SendQueue(listener.way(name, waits=True), partial(listener.cut, self), name)
+        self._listener = listener
         self._numbers = Numbered()
         self._held = False
         self._waiting = bytearray()
-        self.peer = door.bridge.client(self.outbox.send, self._hang_up, ordered=True, hold=self._hold, name=shown)
+        self.peer = listener.bridge.client(self.outbox.send, self._hang_up, ordered=True, hold=self._hold, name=shown)
 
     def send(self, message: bytes) -> None:
         """It has sent something."""
         try:
             taken = self._numbers.unpack(message)
         except Lost as error:
-            self._door.cut(self, str(error))
+            self._listener.cut(self, str(error))
             return
 
         if taken and taken[0] == DATA:
             self._waiting += taken[1]
             self._pass_on()
             if len(self._waiting) > HELD:
-                self._door.cut(self, "it sends more than it may")
+                self._listener.cut(self, "it sends more than it may")
 
     def _hang_up(self) -> None:
         """Ends its connection soon."""
-        asyncio.get_running_loop().call_soon(self._door.leave, self, "the bridge has ended this connection")
+        asyncio.get_running_loop().call_soon(self._listener.leave, self, "the bridge has ended this connection")
 
     def _hold(self, held: bool) -> None:
         """Keeps what it sends, or passes it on again."""

@@ -23,7 +23,7 @@ from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell
 from dobot_async.fleet.families import family_of
 from dobot_async.fleet.fleet import Fleet
-from dobot_async.fleet.seat import Member
+from dobot_async.fleet.fleet_arm import Member
 from dobot_async.program import VOCABULARIES, ProgramError, Step
 from dobot_async.program.text import shortened
 from dobot_async.program.vocabulary import ProgramReader, bare
@@ -70,7 +70,7 @@ def parse_cell_program(lines: Iterable[str], cell: Cell) -> CellProgram:
         ProgramError: Lines are wrong, for at least one of their arms.
     """
     barriers: dict[str, tuple[str, ...]] = {}
-    parts = {name: Part(name, member, cell, barriers) for name, member in cell.members.items()}
+    parts = {name: ArmProgram(name, member, cell, barriers) for name, member in cell.members.items()}
     problems: list[tuple[int, str]] = []
     for number, written in enumerate(lines, 1):
         text = bare(written)
@@ -120,7 +120,7 @@ def word_of(member: Member[Any]) -> str:
     return str(member.options.get("model", family_of(member.kind).name))
 
 
-class Part:
+class ArmProgram:
     """What one arm has to do, as far as it was read.
 
     Args:

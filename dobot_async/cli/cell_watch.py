@@ -18,7 +18,7 @@ from dobot_async.arms.base import Arm
 from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell
 from dobot_async.fleet.families import family_of
-from dobot_async.fleet.seat import Member
+from dobot_async.fleet.fleet_arm import Member
 from dobot_async.traces import TraceFile
 
 __all__ = ["CellReading", "joined_alone", "observe", "read", "told_by"]

@@ -119,7 +119,7 @@ class Job:
         if isinstance(arm, Magician):
             await arm.set_end_effector(self.effector)
 
-        report = Lines(self.session.output.say) if count is None else lambda told: count(told.strokes)
+        report = ProgressLines(self.session.output.say) if count is None else lambda told: count(told.strokes)
         try:
             drawing = CommandDrawing(arm, self.path, self.plane, tool=self.tool, progress=report, **self.options)
             await drawing.run(first=self.begin.stroke, point=self.begin.point)
@@ -135,7 +135,7 @@ class CommandDrawing(Drawing):
         return f"--from-stroke {Begin(self.next_stroke, self.next_point)}"
 
 
-class Lines:
+class ProgressLines:
     """Some lines of progress."""
 
     def __init__(self, say: Callable[[str], None]) -> None:

@@ -14,7 +14,7 @@ from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async.arms.magician import commands as c
 from dobot_async.compat._dll_names import DobotConnect
 from dobot_async.compat._ports import ports_with_arms
-from dobot_async.compat._session import Session
+from dobot_async.compat._session import CompatSession
 from dobot_async.errors import ConnectFailed, ConnectionLost
 
 __all__ = [
@@ -53,10 +53,10 @@ class Api:
 
     def __init__(self, wait: Literal["ms", "s"]) -> None:
         self.wait = wait
-        self._session: Session | None = None
+        self._session: CompatSession | None = None
 
     @property
-    def session(self) -> Session:
+    def session(self) -> CompatSession:
         """The connection; its `arm` is that of `dobot_async.sync`.
 
         Raises:
@@ -74,7 +74,7 @@ class Api:
 
     def connect(self, port: str) -> None:
         """Connect to an arm."""
-        self._session = Session(port)
+        self._session = CompatSession(port)
 
     def tell(self, row: Command[Q, Any], value: Q, queued: int) -> list[int]:
         """Send a command, in its turn or at once; a motion that is not queued is done when this returns.

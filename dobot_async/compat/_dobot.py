@@ -12,7 +12,7 @@ from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import decode
 from dobot_async.compat._dobot_raw import RawDobot
 from dobot_async.compat._dobot_types import Alarm, GPIOPort, Joints, Pose, Position, WrongParameter
-from dobot_async.compat._session import Session
+from dobot_async.compat._session import CompatSession
 
 __all__ = ["BaseDobot"]
 
@@ -37,7 +37,7 @@ class BaseDobot(RawDobot):
     """
 
     def __init__(self, port: str | None = None) -> None:
-        self.session = Session(port)
+        self.session = CompatSession(port)
         with self.session.opening():
             self._set_ptp_joint_params(200, 200, 200, 200, 200, 200, 200, 200)
             self._set_ptp_coordinate_params(velocity=200, acceleration=200)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dobot_async.arms.magician import commands as c
 from dobot_async.compat._dobot_types import ptp_mode
-from dobot_async.compat._session import Session
+from dobot_async.compat._session import CompatSession
 
 __all__ = ["RawDobot"]
 
@@ -19,7 +19,7 @@ class RawDobot:
         session: The connection; `session.arm` is that of `dobot_async.sync`, for what is not here.
     """
 
-    session: Session
+    session: CompatSession
 
     def _set_ptp_cmd(
         self, x: float, y: float, z: float, r: float = 0.0, mode: int = c.PTPMode.MOVJ_XYZ, wait: bool = False

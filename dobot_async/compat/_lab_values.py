@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from dobot_async.arms.magician import commands as c
 
-__all__ = ["Color", "Pose", "Ratios", "Seen", "pin", "socket"]
+__all__ = ["Color", "Pose", "Ratios", "SensorFlag", "pin", "socket"]
 
 PIN = re.compile(r"(?:D[IO]|A[DIO])_?(\d{1,2})", re.IGNORECASE)
 PINS = range(1, 21)
@@ -67,7 +67,7 @@ class Color(ColorNumbers):
         return self[name] if name in self._fields else default
 
 
-class Seen(int):
+class SensorFlag(int):
     """1 if something is seen, else 0; `["status"]` is the same, for programs that ask so."""
 
     def __getitem__(self, name: str) -> int:

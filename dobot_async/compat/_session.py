@@ -21,11 +21,11 @@ from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.magician import commands as c
 from dobot_async.compat._commands import Commands
 from dobot_async.compat._ports import url_of
-from dobot_async.compat._signals import Signals
+from dobot_async.compat._signals import StopSignals
 from dobot_async.errors import ConnectionLost, DobotError
 from dobot_async.sync.portal import PORTAL
 
-__all__ = ["Session"]
+__all__ = ["CompatSession"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
@@ -33,7 +33,7 @@ logger = logging.getLogger("dobot_async.compat")
 STOP = 2.0  # seconds that a stop after Ctrl-C may take
 
 
-class Session:
+class CompatSession:
     """A connection, as the old names use it.
 
     Attributes:
@@ -239,7 +239,7 @@ class Session:
         PORTAL.begin(self._commands.interrupt)
 
 
-OPEN: set[Session] = set()
+OPEN: set[CompatSession] = set()
 """What was not closed yet."""
 
 
@@ -249,7 +249,7 @@ def stop_all() -> None:
         session.begin_stop()
 
 
-SIGNALS = Signals(stop_all)
+SIGNALS = StopSignals(stop_all)
 
 
 def handle_signals_while_open() -> None:
@@ -258,7 +258,7 @@ def handle_signals_while_open() -> None:
         SIGNALS.restore()
 
 
-class Watch:
+class ExitWatch:
     """Whether the end of the program is watched; see `watch_the_end`."""
 
     begun = False
@@ -270,8 +270,8 @@ def watch_the_end() -> None:
     Called after a connection is made, so that this comes before the connections' own end. Python waits for threads
     before that: where the main thread ended by an error, their arms stop first.
     """
-    if not Watch.begun:
-        Watch.begun = True
+    if not ExitWatch.begun:
+        ExitWatch.begun = True
         atexit.register(end)
         before_threads = getattr(threading, "_register_atexit", None)  # what concurrent.futures uses
         if before_threads:

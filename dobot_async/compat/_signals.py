@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable
 from types import FrameType
 
-__all__ = ["Signals"]
+__all__ = ["StopSignals"]
 
 DEFAULTS: dict[str, Callable[[int, FrameType | None], object] | signal.Handlers] = {
     "SIGINT": signal.default_int_handler,
@@ -23,7 +23,7 @@ DEFAULTS: dict[str, Callable[[int, FrameType | None], object] | signal.Handlers]
 """The signals that end a program, and what handles each unless the program says otherwise."""
 
 
-class Signals:
+class StopSignals:
     """The handlers, while arms are connected.
 
     Args:

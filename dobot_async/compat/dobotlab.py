@@ -19,8 +19,8 @@ from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import decode
 from dobot_async.arms.magician.commands import PTPMode
-from dobot_async.compat._lab_values import Color, Pose, Ratios, Seen, pin, socket
-from dobot_async.compat._session import Session
+from dobot_async.compat._lab_values import Color, Pose, Ratios, SensorFlag, pin, socket
+from dobot_async.compat._session import CompatSession
 
 __all__ = ["Dobot", "Magician", "PTPMode", "magician"]
 
@@ -36,17 +36,17 @@ class Magician:
 
     def __init__(self, port: str | None = None) -> None:
         self._port = port
-        self._session: Session | None = None
+        self._session: CompatSession | None = None
 
     @property
-    def session(self) -> Session:
+    def session(self) -> CompatSession:
         """The connection, made when it is first needed; its `arm` is that of `dobot_async.sync`.
 
         Raises:
             ConnectFailed: No arm answered.
         """
         if self._session is None:
-            self._session = Session(self._port)
+            self._session = CompatSession(self._port)
 
         return self._session
 
@@ -154,9 +154,9 @@ class Magician:
         value = c.InfraredSensor(bool(enable), socket(port), c.AccessoryVersion(version))
         return self._run(c.SET_INFRARED_SENSOR, value)
 
-    def get_infrared_sensor(self, port: int) -> Seen:
+    def get_infrared_sensor(self, port: int) -> SensorFlag:
         """Return 1 if the infrared sensor at GP1, GP2, GP4 or GP5 (1, 2, 4, 5) sees something, else 0."""
-        return Seen(self.session.read(c.GET_INFRARED_SENSOR, socket(port)))
+        return SensorFlag(self.session.read(c.GET_INFRARED_SENSOR, socket(port)))
 
     def set_color_sensor(self, port: int, enable: bool, version: int = 0) -> bool:
         """Switch the colour sensor at GP1, GP2, GP4 or GP5 (1, 2, 4, 5); version 0 is V1, 1 is V2."""

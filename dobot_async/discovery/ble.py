@@ -11,7 +11,7 @@ from dobot_async.discovery.found import Found, printable
 from dobot_async.errors import ConnectFailed
 
 if TYPE_CHECKING:
-    from dobot_async.transports.ble.scan import Seen
+    from dobot_async.transports.ble.scan import SeenDevice
 
 __all__ = ["BLEModules"]
 
@@ -55,14 +55,14 @@ class BLEModules:
         except Exception as error:  # what bleak raises is whatever the operating system says
             raise ConnectFailed(trouble(error).text) from error
 
-    def _found(self, seen: Seen, remark: str = "") -> Found:
+    def _found(self, seen: SeenDevice, remark: str = "") -> Found:
         address = seen.device.address
         option = f"?adapter={self._adapter}" if self._adapter else ""
         description = ", ".join(filter(None, (printable(seen.name), remark)))
         return Found(f"ble://{address}{option}", self.name, address, description, families=("magician",))
 
 
-async def next_of(heard: asyncio.Queue[Seen], until: float) -> Seen | None:
+async def next_of(heard: asyncio.Queue[SeenDevice], until: float) -> SeenDevice | None:
     """Returns what is heard next, or None if there is nothing until a time of the loop."""
     with suppress(TimeoutError):
         async with asyncio.timeout_at(until):

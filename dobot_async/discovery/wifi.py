@@ -53,32 +53,32 @@ class WiFiModules:
 
         end = asyncio.get_running_loop().time() + timeout
         async with AsyncExitStack() as stack:
-            ear = Ear()
-            mouths: list[tuple[Any, tuple[str, int]]] = []
+            replies = ReplySocket()
+            sockets: list[tuple[Any, tuple[str, int]]] = []
             refused: list[OSError] = []
             for own, target in ways:
                 try:
-                    mouths.append((await ear.open(own, stack), target))
+                    sockets.append((await replies.open(own, stack), target))
                 except OSError as error:  # a computer's name may lead to addresses that it does not have
                     refused.append(error)
 
-            if not mouths:
+            if not sockets:
                 raise refused[-1]
 
             until = 0.0
             while until < end:
-                for mouth, target in mouths:
-                    mouth.sendto(QUESTION, target)
+                for socket, target in sockets:
+                    socket.sendto(QUESTION, target)
 
                 until = min(asyncio.get_running_loop().time() + self._interval, end)
-                while found := await ear.next(until):
+                while found := await replies.next(until):
                     yield found
 
-            if ear.errors and not ear.heard:
-                raise ear.errors[-1]
+            if replies.errors and not replies.heard:
+                raise replies.errors[-1]
 
 
-class Ear(asyncio.DatagramProtocol):
+class ReplySocket(asyncio.DatagramProtocol):
     """Where answers arrive.
 
     Attributes:

@@ -76,7 +76,7 @@ class RateLimitedLine:
         self._deliver(piece)
 
 
-class Wired(Generic[P]):
+class RateLimitedPeer(Generic[P]):
     """A client behind its two lines."""
 
     def __init__(
@@ -163,12 +163,12 @@ class RateLimited(Generic[P]):
         ordered: bool,
         hold: Callable[[bool], None] = lambda _: None,
         name: str = "",
-    ) -> Wired[P]:
+    ) -> RateLimitedPeer[P]:
         """Connect somebody; see `Host`."""
-        wired: Wired[P] = Wired(self._baud, deliver, hang_up, hold, self._host.leave)
+        wired: RateLimitedPeer[P] = RateLimitedPeer(self._baud, deliver, hang_up, hold, self._host.leave)
         wired.peer = self._host.client(wired.answer, wired.hang_up, ordered=ordered, name=name)
         return wired
 
-    def leave(self, client: Wired[P]) -> None:
+    def leave(self, client: RateLimitedPeer[P]) -> None:
         """Let a client go; the host hears of it when what the client had sent has arrived."""
         client.close()

@@ -3,8 +3,8 @@
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async.fleet.errors import BarrierBroken, ZoneDeadlock, ZoneOccupied
 from dobot_async.fleet.fleet import Fleet
+from dobot_async.fleet.fleet_arm import Member
 from dobot_async.fleet.frames import BaseFrame, Place
-from dobot_async.fleet.seat import Member
 from dobot_async.fleet.together import Start, Together
 
 __all__ = [

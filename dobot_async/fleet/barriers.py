@@ -9,8 +9,8 @@ from functools import partial
 
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async.errors import ReplyTimeout
-from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks
 from dobot_async.fleet.errors import BarrierBroken, ZoneDeadlock
+from dobot_async.fleet.zone_locks import ProgramWait, ZoneHolder, ZoneLocks
 from dobot_async.fleet.zones import FleetProgram
 
 __all__ = ["Barriers"]
@@ -57,11 +57,11 @@ class Barriers:
     """The barriers of a fleet, by name.
 
     Args:
-        claims: Where it is found out who would wait for himself.
+        locks: Where it is found out who would wait for himself.
     """
 
-    def __init__(self, claims: ZoneLocks) -> None:
-        self._claims = claims
+    def __init__(self, locks: ZoneLocks) -> None:
+        self._locks = locks
         self._gatherings: dict[tuple[int, str], Gathering] = {}
         self._gone: dict[tuple[int, str], str] = {}
 
@@ -105,14 +105,14 @@ class Barriers:
 
         check(name, gathering.broken)
         arrived: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-        gathering.waiting[arrived] = part.party if part else None
-        absent = partial(gathering.absent, run.parties if run else {}, arrived)
-        pause = ProgramWait(f"at barrier {name!r} for", program.party, arms | {program.party}, absent)
+        gathering.waiting[arrived] = part.holder if part else None
+        absent = partial(gathering.absent, run.holders if run else {}, arrived)
+        pause = ProgramWait(f"at barrier {name!r} for", program.holder, arms | {program.holder}, absent)
         try:
             if len(gathering.waiting) == len(gathering.parties):
                 gathering.open()
 
-            with self._claims.pausing(pause):
+            with self._locks.pausing(pause):
                 async with asyncio.timeout(timeout):
                     why_not = await arrived
         except ZoneDeadlock:

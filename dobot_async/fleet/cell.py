@@ -37,8 +37,8 @@ from dobot_async._core.util.urls import hidden
 from dobot_async.arms.registry import families
 from dobot_async.arms.session import check_options
 from dobot_async.fleet.families import FAMILIES, AnyArm
+from dobot_async.fleet.fleet_arm import Member
 from dobot_async.fleet.frames import BaseFrame
-from dobot_async.fleet.seat import Member
 from dobot_async.fleet.tables import at, known, number, span, sub, tables, text
 from dobot_async.program.text import read_text, shortened
 from dobot_async.transports import SCHEMES

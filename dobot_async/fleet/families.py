@@ -1,7 +1,7 @@
 """The families in a fleet: their arms with a queue that tells the fleet what happens, and asks it before it sends.
 
-    arm.queue.put_all --> Overseer.admitted --> the arm
-    arm.queue.fail    --> Overseer.ended
+    arm.queue.put_all --> MotionGate.admitted --> the arm
+    arm.queue.fail    --> MotionGate.ended
 
 A family is one of `FAMILIES`.
 """
@@ -110,7 +110,7 @@ class FleetMagician(Magician):
         async def halt() -> None:
             await self.link.request(magician.SET_JOG_CMD, STILL, timeout=math.inf, urgent=True)
 
-        async with self.queue.roaming(halt), super().jogging(direction):
+        async with self.queue.unplanned_motion(halt), super().jogging(direction):
             yield
 
 
@@ -125,7 +125,7 @@ class FleetMyCobot(MyCobot):
     @asynccontextmanager
     async def jogging(self, direction: str, **options: Any) -> AsyncGenerator[None]:
         """Jogs until the block ends, once the fleet allows it; see `MyCobot.jogging`."""
-        async with self.queue.roaming(), super().jogging(direction, **options):
+        async with self.queue.unplanned_motion(), super().jogging(direction, **options):
             yield
 
 
@@ -145,7 +145,7 @@ class FleetUltraArm(UltraArm):
     @asynccontextmanager
     async def jogging(self, direction: UltraArmJog | str, **options: Any) -> AsyncGenerator[None]:
         """Jogs until the block ends, once the fleet allows it; see `UltraArm.jogging`."""
-        async with self.queue.roaming(), super().jogging(direction, **options):
+        async with self.queue.unplanned_motion(), super().jogging(direction, **options):
             yield
 
 

@@ -28,13 +28,13 @@ from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.arms.ultraarm.queue import UltraArmBatch
 from dobot_async.errors import MotionStopped, ReplyTimeout
 from dobot_async.fleet.cell import read_cell
-from dobot_async.fleet.crew import OnFailure
+from dobot_async.fleet.concurrent import run_all
 from dobot_async.fleet.families import AnyArm
+from dobot_async.fleet.fleet_arm import Member, tell_to_stop
+from dobot_async.fleet.fleet_base import OnFailure
 from dobot_async.fleet.frames import BaseFrame, Place
 from dobot_async.fleet.programs import Programs
-from dobot_async.fleet.seat import Member, tell_to_stop
-from dobot_async.fleet.together import Launch, Together, abandon
-from dobot_async.fleet.work import all_of
+from dobot_async.fleet.together import SynchronizedStart, Together, abandon
 from dobot_async.fleet.zones import here
 
 __all__ = ["Fleet", "OnFailure"]
@@ -124,28 +124,28 @@ class Fleet(Programs[A]):
         return cls.connect(cell.members, zones=cell.zones, groups=cell.groups, **options)
 
     def __getitem__(self, name: str) -> A:
-        return cast(A, self._seat(name).arm)
+        return cast(A, self._fleet_arm(name).arm)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._seats)
+        return iter(self._fleet_arms)
 
     def __len__(self) -> int:
-        return len(self._seats)
+        return len(self._fleet_arms)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._seats
+        return name in self._fleet_arms
 
     def arm(self, name: str, kind: type[K]) -> K:
         """Returns an arm of a family, typed; raises TypeError if it is of another."""
-        arm = self._seat(name).arm
+        arm = self._fleet_arm(name).arm
         if not isinstance(arm, kind):
-            raise TypeError(f"{name} is a {self._seat(name).member.kind.__name__}, not a {kind.__name__}")
+            raise TypeError(f"{name} is a {self._fleet_arm(name).member.kind.__name__}, not a {kind.__name__}")
 
         return arm
 
     def member(self, name: str) -> Member[A]:
         """Returns what the fleet was told of an arm before it was connected."""
-        return self._seat(name).member
+        return self._fleet_arm(name).member
 
     @property
     def zones(self) -> Mapping[str, Shape | None]:
@@ -154,7 +154,7 @@ class Fleet(Programs[A]):
 
     def base(self, name: str) -> BaseFrame:
         """Returns where an arm stands in the cell."""
-        return self._seat(name).member.base
+        return self._fleet_arm(name).member.base
 
     def to_cell(self, name: str, x: float, y: float, z: float, r: float = 0.0) -> Place:
         """Returns where in the cell a place of an arm is."""
@@ -181,19 +181,21 @@ class Fleet(Programs[A]):
             DobotError: An arm could not be stopped; the others were.
         """
         within = check_timeout(timeout)
-        seats = [seat for seat in self._seats.values() if seat.commands]
-        if not seats:
+        fleet_arms = [fleet_arm for fleet_arm in self._fleet_arms.values() if fleet_arm.commands]
+        if not fleet_arms:
             raise ValueError("a stop is a command, and these connections only read (control=False)")
 
-        tell_to_stop(seats)
+        tell_to_stop(fleet_arms)
         error = MotionStopped("the fleet was stopped")
         self._epoch = self._epoch.end(error)
         here().go_on(self._epoch)
         self._barriers.stop()
-        self._zones.claims.stop(error)
-        stops = {seat.name: seat.begin_stop(MotionStopped("the arm was told to stop")) for seat in seats}
+        self._zones.locks.stop(error)
+        stops = {
+            fleet_arm.name: fleet_arm.begin_stop(MotionStopped("the arm was told to stop")) for fleet_arm in fleet_arms
+        }
         await asyncio.wait(stops.values(), timeout=within)
-        await all_of({name: stopped(stop, timeout) for name, stop in stops.items()})
+        await run_all({name: stopped(stop, timeout) for name, stop in stops.items()})
 
     async def recover(self) -> None:
         """Makes all arms ready again after a failure: clears alarms and queues, and lets them move.
@@ -202,13 +204,13 @@ class Fleet(Programs[A]):
             DobotError: An arm does not recover; the fleet stays stopped.
         """
         await self._stops_heard()
-        reasons = {name: seat.stopped for name, seat in self._seats.items()}
-        await all_of({name: seat.recover() for name, seat in self._seats.items()})
+        reasons = {name: fleet_arm.stopped for name, fleet_arm in self._fleet_arms.items()}
+        await run_all({name: fleet_arm.recover() for name, fleet_arm in self._fleet_arms.items()})
         self._barriers.forget()
-        for name, seat in self._seats.items():
-            if seat.stopped is reasons[name]:  # else another failure has stopped it meanwhile
-                seat.stopped = None
-                self._works(seat)
+        for name, fleet_arm in self._fleet_arms.items():
+            if fleet_arm.stopped is reasons[name]:  # else another failure has stopped it meanwhile
+                fleet_arm.stopped = None
+                self._works(fleet_arm)
 
     @overload
     def together(
@@ -244,19 +246,21 @@ class Fleet(Programs[A]):
             ZoneDeadlock: The ways of two of the arms lead through one zone.
             DobotError: The batches could not be loaded or released; the arms were stopped.
         """
-        seats = {name: self._seat(name) for name in names or self._seats}
-        batches = {name: seat.family.batch(seat.arm) for name, seat in seats.items()}
-        together, epochs = Together(batches), {name: seat.queue.epoch for name, seat in seats.items()}
+        fleet_arms = {name: self._fleet_arm(name) for name in names or self._fleet_arms}
+        batches = {name: fleet_arm.family.batch(fleet_arm.arm) for name, fleet_arm in fleet_arms.items()}
+        together, epochs = Together(batches), {name: fleet_arm.queue.epoch for name, fleet_arm in fleet_arms.items()}
         try:
             yield together
         except BaseException:
             abandon(batches)
             raise
 
-        commanded = {name: seat for name, seat in seats.items() if batches[name].motions}
+        commanded = {name: fleet_arm for name, fleet_arm in fleet_arms.items() if batches[name].motions}
         if commanded:
             try:
-                together.start = await Launch(commanded, batches, epochs, self._zones, check_timeout(timeout)).run()
+                together.start = await SynchronizedStart(
+                    commanded, batches, epochs, self._zones, check_timeout(timeout)
+                ).run()
             except BaseException:
                 abandon(batches)
                 raise

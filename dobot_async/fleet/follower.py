@@ -9,8 +9,8 @@ from contextlib import suppress
 from typing import Any
 
 from dobot_async.errors import DobotError
-from dobot_async.fleet.course import PlannedStep
 from dobot_async.fleet.guard import Guard
+from dobot_async.fleet.planned_steps import PlannedStep
 
 __all__ = ["Follower"]
 

@@ -1,6 +1,6 @@
 """Keeps one arm out of zones that others hold: looks at each way before it is sent, and holds what is on it.
 
-    put --> plan (planner) --> zones on it --claim--> enter --> sent --> done --> the zones behind are released
+    put --> plan (planner) --> zones on it --request--> enter --> sent --> done --> the zones behind are released
 
 The arm holds a zone from before a motion into it is sent until the arm is known to stand outside, so that two guarded
 arms are never in one zone, whatever programs do. Where it may be is found out in `whereabouts`; each way of one that
@@ -18,12 +18,12 @@ from contextlib import asynccontextmanager
 from typing import Literal, TypeVar
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
-from dobot_async.fleet.course import PlannedCourse, PlannedStep, shifted
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.limits import FleetLimits
+from dobot_async.fleet.planned_steps import PlannedStep, PlannedSteps, shifted
 from dobot_async.fleet.planner import Planner, Stance
-from dobot_async.fleet.whereabouts import Stops, Whereabouts
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneRequest
+from dobot_async.fleet.zone_tracker import StopWaiter, ZoneTracker
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Guard", "Mode"]
@@ -32,7 +32,7 @@ Mode = Literal["off", "wait", "raise"]
 S = TypeVar("S", bound=Stance)
 
 
-class Guard(Whereabouts[S]):
+class Guard(ZoneTracker[S]):
     """The guard of one arm.
 
     Args:
@@ -40,7 +40,7 @@ class Guard(Whereabouts[S]):
         planner: What is known of its ways.
         queue: Its queue.
         zones: Those of the cell.
-        party: As what it holds them.
+        holder: As what it holds them.
         base: Where it stands.
         mode: What it does where another one holds a zone: "wait" or "raise".
         clearance: mm around the tool.
@@ -51,20 +51,20 @@ class Guard(Whereabouts[S]):
         self,
         steps: deque[PlannedStep],
         planner: Planner[S],
-        queue: Stops,
+        queue: StopWaiter,
         zones: Zones,
-        party: ZoneHolder,
+        holder: ZoneHolder,
         *,
         base: BaseFrame,
         mode: Mode,
         clearance: float,
         limits: FleetLimits,
     ) -> None:
-        super().__init__(steps, planner, queue, zones, party, base=base, clearance=clearance)
+        super().__init__(steps, planner, queue, zones, holder, base=base, clearance=clearance)
         self.patient = mode == "wait"
         self._limits = limits
 
-    async def plan(self, motions: Sequence[Motion]) -> PlannedCourse[S]:
+    async def plan(self, motions: Sequence[Motion]) -> PlannedSteps[S]:
         """Look at commands that are to be sent together; nothing is held yet.
 
         Raises:
@@ -99,9 +99,9 @@ class Guard(Whereabouts[S]):
 
             stance = plan.end
 
-        return PlannedCourse(steps, stance, changes)
+        return PlannedSteps(steps, stance, changes)
 
-    async def claim(self, zones: frozenset[str], deadline: float | None) -> ZoneRequest | None:
+    async def request(self, zones: frozenset[str], deadline: float | None) -> ZoneRequest | None:
         """Wait for zones, or raise, as the mode says.
 
         Raises:
@@ -111,37 +111,37 @@ class Guard(Whereabouts[S]):
             MotionUnknown: The arm was switched off and on meanwhile.
         """
         program = here()
-        self._zones.drive(self._party.name, program)
+        self._zones.drive(self._holder.name, program)
         if not zones:
             return None
 
         # Only its own programs let it in: two arms that one program moves must not meet, either.
-        own = frozenset(each.party for each in program.line()) | {self._party}
-        claim = ZoneRequest(
-            self._party,
+        own = frozenset(each.holder for each in program.line()) | {self._holder}
+        request = ZoneRequest(
+            self._holder,
             own,
             zones,
             patient=self.patient,
             stuck=self._zones.driven(program),
-            asker=program.party,
+            asker=program.holder,
             parked=self._zones.parked(program),
         )
         left = None if deadline is None else max(0.0, deadline - asyncio.get_running_loop().time())
-        return await self._zones.claim(claim, left, self._planner.check)
+        return await self._zones.request(request, left, self._planner.check)
 
     async def check(self) -> None:
         """Raise MotionUnknown if the arm was switched off and on, as it may be while it waits for zones."""
         await self._planner.check()
 
     @asynccontextmanager
-    async def roaming(self) -> AsyncGenerator[None]:
+    async def unplanned_motion(self) -> AsyncGenerator[None]:
         """While this is entered, the arm may go anywhere."""
         if self.is_limited:
             await self._be_sure()
             self._check_homed()
 
-        claim = await self.claim(self._anywhere(), None)
-        async with self._loosened(claim):
+        request = await self.request(self._anywhere(), None)
+        async with self._loosened(request):
             yield
 
     @asynccontextmanager
@@ -159,9 +159,9 @@ class Guard(Whereabouts[S]):
             yield
             return
 
-        claim = await self.claim(self._zones_of(plan.region), None)
+        request = await self.request(self._zones_of(plan.region), None)
         self._planner.begun(value)
-        async with self._loosened(claim):
+        async with self._loosened(request):
             for step in self._steps:
                 if step.motion.moves:
                     step.zones, step.after = self._anywhere(), None
@@ -183,6 +183,6 @@ class Guard(Whereabouts[S]):
         """Raise ValueError if the arm has limits, and does not know where it is."""
         if self.is_limited and self._planner.astray:
             raise ValueError(
-                f"{self._party.name}: it has lost its place, and cannot be kept within its limits until it was homed; "
+                f"{self._holder.name}: it has lost its place, and cannot be kept within its limits until it was homed; "
                 "await home() first"
             )

@@ -34,7 +34,7 @@ RAIL_LENGTH = 1000.0  # mm
 SAME_TOOL = 0.01  # mm
 
 
-class Asked(Protocol):
+class MagicianReads(Protocol):
     """A Magician, as far as it is asked."""
 
     @property
@@ -65,7 +65,7 @@ class MagicianPlanner:
         heading: The direction in which l grows; None for an arm on no rail.
     """
 
-    def __init__(self, arm: Asked, heading: float | None) -> None:
+    def __init__(self, arm: MagicianReads, heading: float | None) -> None:
         self._arm = arm
         self._heading = heading
         self._said: list[c.EndEffectorParams] = []  # one of these is on the arm

@@ -9,10 +9,10 @@ from functools import partial
 from typing import Any, Concatenate, ParamSpec, TypeVar, overload
 
 from dobot_async.errors import DobotError
-from dobot_async.fleet.claims import ZoneHolder
-from dobot_async.fleet.crew import FleetBase
-from dobot_async.fleet.seat import FleetArm
-from dobot_async.fleet.work import named, side_by_side
+from dobot_async.fleet.concurrent import run_concurrently, with_arm_name
+from dobot_async.fleet.fleet_arm import FleetArm
+from dobot_async.fleet.fleet_base import FleetBase
+from dobot_async.fleet.zone_locks import ZoneHolder
 from dobot_async.fleet.zones import FleetProgram, Run, here, running
 
 __all__ = ["Programs"]
@@ -47,22 +47,22 @@ class Programs(FleetBase[A]):
         """
         parent, epoch = here(), self._epoch
 
-        async def done(seat: FleetArm) -> Any:
+        async def done(fleet_arm: FleetArm) -> Any:
             does: Callable[..., Awaitable[Any]] = (
-                getattr(seat.arm, verb) if isinstance(verb, str) else partial(verb, seat.arm)
+                getattr(fleet_arm.arm, verb) if isinstance(verb, str) else partial(verb, fleet_arm.arm)
             )
-            part = FleetProgram(ZoneHolder(f"each {seat.name}"), asyncio.current_task(), parent, epoch=epoch)
+            part = FleetProgram(ZoneHolder(f"each {fleet_arm.name}"), asyncio.current_task(), parent, epoch=epoch)
             try:
                 with running(part):
                     part.check()
                     return await does(*args, **kwargs)
             except (DobotError, ValueError) as error:
-                named(seat.name, error)
+                with_arm_name(fleet_arm.name, error)
                 raise
 
         async with self._stopping_others():
-            work = {name: done(seat) for name, seat in self._seats.items()}
-            return await side_by_side(work, ends=self._ends, causes=self._causes)
+            work = {name: done(fleet_arm) for name, fleet_arm in self._fleet_arms.items()}
+            return await run_concurrently(work, ends=self._ends, causes=self._causes)
 
     async def run(self, programs: Mapping[str, Coroutine[Any, Any, T]]) -> dict[str, T]:
         """Runs programs side by side, and returns what each has returned.
@@ -78,8 +78,8 @@ class Programs(FleetBase[A]):
         run = Run({name: ZoneHolder(f"program {name}") for name in programs}, set(programs))
 
         async def ran(name: str, program: Coroutine[Any, Any, T]) -> T:
-            arm = name if name in self._seats else None
-            part = FleetProgram(run.parties[name], asyncio.current_task(), parent, arm, run, epoch)
+            arm = name if name in self._fleet_arms else None
+            part = FleetProgram(run.holders[name], asyncio.current_task(), parent, arm, run, epoch)
             if arm:
                 self._zones.drive(arm, part)
 
@@ -90,7 +90,7 @@ class Programs(FleetBase[A]):
             except BaseException as error:
                 why = f"has failed: {error or type(error).__name__}"
                 if arm and isinstance(error, ValueError):
-                    named(name, error)
+                    with_arm_name(name, error)
 
                 raise
             finally:
@@ -100,7 +100,7 @@ class Programs(FleetBase[A]):
         async with self._stopping_others():
             try:
                 work = {name: ran(name, each) for name, each in programs.items()}
-                return await side_by_side(work, ends=self._ends, causes=self._causes)
+                return await run_concurrently(work, ends=self._ends, causes=self._causes)
             finally:
                 self._barriers.forget(run)
 
@@ -120,7 +120,7 @@ class Programs(FleetBase[A]):
         """
         program = here()
         part = program.part()
-        names = parties or (part.run.parties if part and part.run else self._seats)
+        names = parties or (part.run.holders if part and part.run else self._fleet_arms)
         arms = self._zones.driven(program)
         await self._barriers.wait(name, frozenset(names), program, arms, timeout, self._epoch)
 
@@ -141,10 +141,10 @@ class Programs(FleetBase[A]):
             MotionStopped: The fleet was stopped while this waited.
         """
         for arm in arms:
-            self._seat(arm)
+            self._fleet_arm(arm)
 
         return self._zones.hold(name, arms, timeout, self._epoch)
 
     def holders(self, zone: str) -> list[str]:
         """Returns the names of those who hold a zone."""
-        return [party.name for party in self._zones.claims.holders(zone)]
+        return [holder.name for holder in self._zones.locks.holders(zone)]

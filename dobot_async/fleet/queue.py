@@ -1,7 +1,7 @@
 """The queue of an arm in a fleet: it asks the fleet before it sends, and tells it what ends all motions.
 
-arm.queue.put_all --> Overseer.admitted --> the arm
-arm.queue.fail    --> Overseer.ended
+arm.queue.put_all --> MotionGate.admitted --> the arm
+arm.queue.fail    --> MotionGate.ended
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from dobot_async._core.util.arguments import check_timeout
 from dobot_async.errors import DobotError
 from dobot_async.fleet.zones import here
 
-__all__ = ["FleetQueue", "Overseer"]
+__all__ = ["FleetQueue", "MotionGate"]
 
 
-class Overseer(Protocol):
+class MotionGate(Protocol):
     """What a queue of the fleet reports to."""
 
     def admitted(
@@ -29,7 +29,7 @@ class Overseer(Protocol):
         """While this is entered, motions may be sent; raises if they may not be. Yields the seconds that are left."""
         ...
 
-    def roaming(self, halt: Callable[[], Awaitable[None]] | None) -> AbstractAsyncContextManager[None]:
+    def unplanned_motion(self, halt: Callable[[], Awaitable[None]] | None) -> AbstractAsyncContextManager[None]:
         """While this is entered, the arm may go anywhere; raises if it may not.
 
         Args:
@@ -49,21 +49,21 @@ class FleetQueue(MotionQueue):
     """The part of a queue that reports to the fleet.
 
     Attributes:
-        overseer: To whom; None until the arm is in its fleet.
+        gate: To whom; None until the arm is in its fleet.
     """
 
-    overseer: Overseer | None = None
+    gate: MotionGate | None = None
 
     async def put_all(
         self, motions: Sequence[Motion], *, timeout: float | None = None, epoch: Epoch | None = None
     ) -> None:
         """Gives several commands to the arm's queue once the fleet allows them; see `MotionQueue.put_all`."""
         epoch = epoch or self.epoch
-        if self.overseer is None:
+        if self.gate is None:
             await self.put_admitted(motions, timeout, epoch)
             return
 
-        async with self.overseer.admitted(motions, check_timeout(timeout), epoch) as left:
+        async with self.gate.admitted(motions, check_timeout(timeout), epoch) as left:
             await self.put_admitted(motions, left, epoch)
 
     async def put_admitted(self, motions: Sequence[Motion], timeout: float | None, epoch: Epoch) -> None:
@@ -82,15 +82,15 @@ class FleetQueue(MotionQueue):
 
     def fail(self, error: DobotError, *, spare: Sequence[Motion] = ()) -> None:
         """Ends all Motions with an error, and tells the fleet; see `MotionQueue.fail`."""
-        if self.overseer:
-            self.overseer.ended(error)
+        if self.gate:
+            self.gate.ended(error)
 
         super().fail(error, spare=spare)
 
-    def roaming(self, halt: Callable[[], Awaitable[None]] | None = None) -> AbstractAsyncContextManager[None]:
+    def unplanned_motion(self, halt: Callable[[], Awaitable[None]] | None = None) -> AbstractAsyncContextManager[None]:
         """While this is entered, the arm may go anywhere."""
-        return self.overseer.roaming(halt) if self.overseer else nullcontext()
+        return self.gate.unplanned_motion(halt) if self.gate else nullcontext()
 
     def changing(self, value: object) -> AbstractAsyncContextManager[None]:
         """While this is entered, something changes at once on which the arm's ways depend."""
-        return self.overseer.changing(value) if self.overseer else nullcontext()
+        return self.gate.changing(value) if self.gate else nullcontext()

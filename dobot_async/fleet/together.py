@@ -1,6 +1,6 @@
 """Batches on several arms that start at one instant.
 
-    join --> claim --> measure --> pause --> load --> release each, earlier by what its link takes --> rest --> skew
+    join --> request --> measure --> pause --> load --> release each, earlier by what its link takes --> rest --> skew
 
 Nobody else commands the arms meanwhile, and each step is bound to the epochs in which the block began: a stop of one of
 the arms ends the start of all.
@@ -22,14 +22,14 @@ from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import MotionStopped, another
 from dobot_async.fleet.admission import admit_together, turns
-from dobot_async.fleet.seat import FleetArm, tell_to_stop
-from dobot_async.fleet.work import on_the_way_out, side_by_side
+from dobot_async.fleet.concurrent import on_the_way_out, run_concurrently
+from dobot_async.fleet.fleet_arm import FleetArm, tell_to_stop
 from dobot_async.fleet.zones import Zones
 
-__all__ = ["Launch", "Start", "Together", "abandon"]
+__all__ = ["Start", "SynchronizedStart", "Together", "abandon"]
 
 
-class Collected(Protocol):
+class CollectedBatch(Protocol):
     """A batch, as far as its start is concerned."""
 
     @property
@@ -38,7 +38,7 @@ class Collected(Protocol):
         ...
 
 
-B = TypeVar("B", bound=Collected)
+B = TypeVar("B", bound=CollectedBatch)
 SAMPLES = 7
 PLENTY = 1000  # commands that a queue on this side takes
 LEAD = 0.003  # seconds from the decision to the first release, for all to be ready to send
@@ -98,18 +98,18 @@ class Together(Generic[B]):
 
     async def wait(self) -> None:
         """Returns when all motions are done; raises the first failure when all have ended."""
-        await side_by_side(
+        await run_concurrently(
             {name: wait_for(batch) for name, batch in self.batches.items()}, ends=lambda _name, _error: False
         )
 
 
-async def wait_for(batch: Collected) -> None:
+async def wait_for(batch: CollectedBatch) -> None:
     """Waits for all motions of a batch."""
     for motion in list(batch.motions):
         await motion
 
 
-def abandon(batches: Mapping[str, Collected]) -> None:
+def abandon(batches: Mapping[str, CollectedBatch]) -> None:
     """Ends the Motions of batches that were not sent."""
     for batch in batches.values():
         for motion in batch.motions:
@@ -118,27 +118,27 @@ def abandon(batches: Mapping[str, Collected]) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Launch:
+class SynchronizedStart:
     """A start under way.
 
     Attributes:
-        seats: The arms.
+        fleet_arms: The arms.
         batches: What each is to do.
         epochs: Those of the arms in which the block began.
         zones: The zones of the cell.
         timeout: Seconds for the arms to finish what they do, for the zones, and for room in their queues.
     """
 
-    seats: Mapping[str, FleetArm]
-    batches: Mapping[str, Collected]
+    fleet_arms: Mapping[str, FleetArm]
+    batches: Mapping[str, CollectedBatch]
     epochs: Mapping[str, Epoch]
     zones: Zones
     timeout: float | None
 
     def check(self) -> None:
         """Raises MotionStopped if one of the arms was stopped since the block began."""
-        for name, seat in self.seats.items():
-            seat.check()
+        for name, fleet_arm in self.fleet_arms.items():
+            fleet_arm.check()
             self.epochs[name].check()
 
     async def run(self) -> Start:
@@ -147,63 +147,63 @@ class Launch:
         Raises:
             DobotError: As `put_all` does; the arms were stopped.
         """
-        seats = self.seats
+        fleet_arms = self.fleet_arms
         self.check()
-        async with turns(seats):
+        async with turns(fleet_arms):
             self.check()
-            await side_by_side({name: seat.queue.join(self.timeout) for name, seat in seats.items()})
+            await run_concurrently({name: fleet_arm.queue.join(self.timeout) for name, fleet_arm in fleet_arms.items()})
             self.check()
-            motions = {name: self.batches[name].motions for name in seats}
-            for seat in seats.values():
-                seat.quiet(True)  # what is admitted cannot be watched before it is sent
+            motions = {name: self.batches[name].motions for name in fleet_arms}
+            for fleet_arm in fleet_arms.values():
+                fleet_arm.quiet(True)  # what is admitted cannot be watched before it is sent
 
             try:
-                await admit_together(seats, motions, self.zones, self.timeout)
+                await admit_together(fleet_arms, motions, self.zones, self.timeout)
                 self.check()
-                latency = await side_by_side({name: measure(seat) for name, seat in seats.items()})
+                latency = await run_concurrently({name: measure(fleet_arm) for name, fleet_arm in fleet_arms.items()})
                 return await self._start(latency)
             except BaseException as error:
                 abandon(self.batches)  # before anybody watches them
-                await on_the_way_out(error, give_up(seats))
+                await on_the_way_out(error, give_up(fleet_arms))
                 raise
             finally:
                 self._watch()
 
     async def _start(self, latency: Mapping[str, float]) -> Start:
         """Loads what the arms take while they are paused, starts them, and sends the rest."""
-        seats = self.seats
+        fleet_arms = self.fleet_arms
         try:
-            pausing = {name: seat for name, seat in seats.items() if seat.family.pauses}
-            await side_by_side({name: seat.queue.pause() for name, seat in pausing.items()})
-            rooms = await side_by_side({name: room(seat) for name, seat in pausing.items()})
+            pausing = {name: fleet_arm for name, fleet_arm in fleet_arms.items() if fleet_arm.family.pauses}
+            await run_concurrently({name: fleet_arm.queue.pause() for name, fleet_arm in pausing.items()})
+            rooms = await run_concurrently({name: room(fleet_arm) for name, fleet_arm in pausing.items()})
             first: dict[str, Sequence[Motion]] = {}
             rest: dict[str, Sequence[Motion]] = {}
-            for name in seats:
+            for name in fleet_arms:
                 motions = self.batches[name].motions
                 loaded = max(1, rooms.get(name, 1) - 1)
                 first[name], rest[name] = motions[:loaded], motions[loaded:]
 
-            await side_by_side({name: self._put(name, first[name]) for name in pausing})
+            await run_concurrently({name: self._put(name, first[name]) for name in pausing})
             self.check()
             instant = asyncio.get_running_loop().time() + LEAD + max(latency.values())
-            told = await side_by_side(
-                {name: self._release(name, instant - latency[name], first[name]) for name in seats}
+            told = await run_concurrently(
+                {name: self._release(name, instant - latency[name], first[name]) for name in fleet_arms}
             )
         finally:
             self._watch()
 
-        await side_by_side({name: self._put(name, more) for name, more in rest.items() if more})
+        await run_concurrently({name: self._put(name, more) for name, more in rest.items() if more})
         at = {name: (sent + answered) / 2 for name, (sent, answered) in told.items()}
         return Start(at, latency, max(answered - sent for sent, answered in told.values()) / 2)
 
     def _watch(self) -> None:
         """Has the arms watched again."""
-        for seat in self.seats.values():
-            seat.quiet(False)
+        for fleet_arm in self.fleet_arms.values():
+            fleet_arm.quiet(False)
 
     async def _put(self, name: str, motions: Sequence[Motion]) -> None:
         """Sends motions that were admitted."""
-        await self.seats[name].queue.put_admitted(motions, self.timeout, self.epochs[name])
+        await self.fleet_arms[name].queue.put_admitted(motions, self.timeout, self.epochs[name])
 
     async def _release(self, name: str, when: float, motions: Sequence[Motion]) -> tuple[float, float]:
         """Starts one arm at a time; returns when that was sent, and when it was answered."""
@@ -211,39 +211,39 @@ class Launch:
         await asyncio.sleep(when - loop.time())
         self.check()
         sent = loop.time()
-        if self.seats[name].family.pauses:
-            await self.seats[name].queue.resume()
+        if self.fleet_arms[name].family.pauses:
+            await self.fleet_arms[name].queue.resume()
         else:
             await self._put(name, motions)
 
         return sent, loop.time()
 
 
-async def room(seat: FleetArm) -> int:
+async def room(fleet_arm: FleetArm) -> int:
     """Returns how many commands an arm takes while it is paused."""
-    return await seat.arm.request(seat.family.room, None) if seat.family.room else PLENTY
+    return await fleet_arm.arm.request(fleet_arm.family.room, None) if fleet_arm.family.room else PLENTY
 
 
-async def measure(seat: FleetArm) -> float:
+async def measure(fleet_arm: FleetArm) -> float:
     """Returns how many seconds a message takes to an arm: half of a typical round trip."""
     loop = asyncio.get_running_loop()
     trips: list[float] = []
     for _ in range(SAMPLES):
         asked = loop.time()
-        await seat.arm.request(seat.family.ask, None)
+        await fleet_arm.arm.request(fleet_arm.family.ask, None)
         trips.append(loop.time() - asked)
 
     return statistics.median(trips) / 2
 
 
-async def give_up(seats: Mapping[str, FleetArm]) -> list[str]:
+async def give_up(fleet_arms: Mapping[str, FleetArm]) -> list[str]:
     """Stops arms that were to start, so that what was loaded does not run later.
 
     Returns:
         Of which arms it is not known whether they stand.
     """
-    tell_to_stop(seats.values())
+    tell_to_stop(fleet_arms.values())
     error = MotionStopped("the start of several arms together was given up")
-    stops = [(seat, seat.begin_stop(another(error))) for seat in seats.values()]
-    heard = await asyncio.gather(*(seat.stop_heard(stop) for seat, stop in stops))
+    stops = [(fleet_arm, fleet_arm.begin_stop(another(error))) for fleet_arm in fleet_arms.values()]
+    heard = await asyncio.gather(*(fleet_arm.stop_heard(stop) for fleet_arm, stop in stops))
     return [problem for problem in heard if problem]

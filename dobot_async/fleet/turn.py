@@ -8,7 +8,7 @@ from contextlib import nullcontext
 import anyio
 
 from dobot_async.errors import ReplyTimeout
-from dobot_async.fleet.claims import ProgramWait, ZoneHolder
+from dobot_async.fleet.zone_locks import ProgramWait, ZoneHolder
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["Turn"]
@@ -36,16 +36,16 @@ class Turn:
             ReplyTimeout: Others took too long.
         """
         program = here()
-        stuck = self._zones.driven(program) | {program.party}
-        turn = ProgramWait(f"to command {self._name} behind", program.party, stuck, lambda: self._commanding)
+        stuck = self._zones.driven(program) | {program.holder}
+        turn = ProgramWait(f"to command {self._name} behind", program.holder, stuck, lambda: self._commanding)
         try:
             async with asyncio.timeout_at(deadline):
-                with self._zones.claims.pausing(turn) if self._order.locked() else nullcontext():
+                with self._zones.locks.pausing(turn) if self._order.locked() else nullcontext():
                     await self._order.acquire()
         except TimeoutError:
             raise ReplyTimeout(f"{self._name}: others were before it, and took too long") from None
 
-        self._commanding = (program.party,)
+        self._commanding = (program.holder,)
 
     def end(self) -> None:
         """Lets others command the arm."""

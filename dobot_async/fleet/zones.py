@@ -1,6 +1,6 @@
-"""Zones for programs: `async with fleet.zone("bin")`, and the claims of guarded arms.
+"""Zones for programs: `async with fleet.zone("bin")`, and the requests of guarded arms.
 
-A zone is held by a party: an arm, for as long as it is in it or has a way through it ahead, or a program, for the
+A zone is held by an arm, for as long as it is in it or has a way through it ahead, or a program, for the
 length of a block. A program is a task; the tasks that it starts act for it, but do not share what they hold with each
 other.
 """
@@ -17,7 +17,7 @@ from weakref import WeakSet
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.util.shapes import Shape
 from dobot_async.errors import DobotError, ReplyTimeout, another
-from dobot_async.fleet.claims import ZoneHolder, ZoneLocks, ZoneRequest
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneLocks, ZoneRequest
 
 __all__ = ["FleetProgram", "Run", "Zones", "here", "running"]
 
@@ -27,11 +27,11 @@ class Run:
     """Programs that run side by side.
 
     Attributes:
-        parties: As what they hold zones, by name.
+        holders: As what they hold zones, by name.
         alive: The names of those that have not ended.
     """
 
-    parties: Mapping[str, ZoneHolder]
+    holders: Mapping[str, ZoneHolder]
     alive: set[str] = field(default_factory=set[str])
 
 
@@ -40,7 +40,7 @@ class FleetProgram:
     """A task that commands arms.
 
     Attributes:
-        party: As what it holds zones.
+        holder: As what it holds zones.
         task: Which task.
         parent: The program that started it.
         arm: The arm that it is the program of, if it is.
@@ -48,7 +48,7 @@ class FleetProgram:
         epoch: That of the fleet in which it began; None for a task that the fleet has not begun.
     """
 
-    party: ZoneHolder
+    holder: ZoneHolder
     task: asyncio.Task[object] | None
     parent: FleetProgram | None = None
     arm: str | None = None
@@ -109,15 +109,15 @@ class Zones:
 
     Attributes:
         shapes: Where each is; None for one that is only a name.
-        arms: The parties of the arms.
-        claims: Who holds what.
-        guards: To be called before a claim is judged: what has ended meanwhile is released.
+        arms: The holders of the arms.
+        locks: Who holds what.
+        guards: To be called before a request is judged: what has ended meanwhile is released.
         drivers: Which task has moved an arm last; None if it has ended.
     """
 
     shapes: Mapping[str, Shape | None]
     arms: Mapping[str, ZoneHolder]
-    claims: ZoneLocks = field(default_factory=ZoneLocks)
+    locks: ZoneLocks = field(default_factory=ZoneLocks)
     guards: list[Callable[[], Awaitable[None]]] = field(default_factory=list[Callable[[], Awaitable[None]]])
     drivers: dict[str, asyncio.Task[object] | None] = field(default_factory=dict[str, asyncio.Task[object] | None])
     _watched: WeakSet[asyncio.Task[object]] = field(default_factory=WeakSet[asyncio.Task[object]])
@@ -146,10 +146,10 @@ class Zones:
         runs = [(each.run, each.arm) for each in line if each.run]
         first = next((at for at, each in enumerate(line) if each.run), len(line))
         waiting = {each.task for each in line[first + 1 :]}
-        names = {party: arm for arm, party in self.arms.items()}
+        names = {holder: arm for arm, holder in self.arms.items()}
 
-        def parked(party: ZoneHolder) -> bool:
-            arm = names.get(party)
+        def parked(holder: ZoneHolder) -> bool:
+            arm = names.get(holder)
             if arm is None or not runs or any(arm in run.alive and arm != own for run, own in runs):
                 return False
 
@@ -170,10 +170,10 @@ class Zones:
         return frozenset(self.arms[arm] for arm, task in self.drivers.items() if task is program.task)
 
     def own(self, program: FleetProgram, *arms: str) -> frozenset[ZoneHolder]:
-        """Returns the parties that a program acts for: itself, its parents, the arms that they are for, and others."""
+        """Returns the holders that a program acts for: itself, its parents, the arms that they are for, and others."""
         line = list(program.line())
         named = {*arms, *(each.arm for each in line if each.arm)}
-        return frozenset(each.party for each in line) | {self.arms[arm] for arm in named}
+        return frozenset(each.holder for each in line) | {self.arms[arm] for arm in named}
 
     @asynccontextmanager
     async def hold(self, zone: str, arms: Collection[str], timeout: float | None, epoch: Epoch) -> AsyncGenerator[None]:
@@ -185,23 +185,23 @@ class Zones:
         program.check()
         own = self.own(program, *arms) | self.driven(program)
         parked = self.parked(program)
-        claim = await self.claim(ZoneRequest(program.party, own, frozenset([zone]), parked=parked), timeout)
+        request = await self.request(ZoneRequest(program.holder, own, frozenset([zone]), parked=parked), timeout)
         try:
             epoch.check()
             with running(program):
                 yield
         finally:
-            self.claims.release(claim)
+            self.locks.release(request)
 
-    async def claim(
-        self, claim: ZoneRequest, timeout: float | None, check: Callable[[], Awaitable[None]] | None = None
+    async def request(
+        self, request: ZoneRequest, timeout: float | None, check: Callable[[], Awaitable[None]] | None = None
     ) -> ZoneRequest:
-        """Returns a claim once it is granted.
+        """Returns a request once it is granted.
 
         Args:
-            claim: The claim.
+            request: The request.
             timeout: Seconds.
-            check: Raises if the claim has lost its purpose; called when it was not granted at once.
+            check: Raises if the request has lost its purpose; called when it was not granted at once.
 
         Raises:
             ZoneOccupied: It would have to wait, and is not patient; or a holder has failed.
@@ -214,36 +214,36 @@ class Zones:
             if not answered.done():
                 answered.set_result(error)
 
-        claim.answer = answer
+        request.answer = answer
         try:
             async with asyncio.timeout(timeout):
-                with self.claims.preparing(claim):
+                with self.locks.preparing(request):
                     await asyncio.gather(*(catch_up() for catch_up in self.guards))
 
                 if not answered.done():
-                    self.claims.request(claim)
+                    self.locks.request(request)
 
                 waits = not answered.done()
                 error = await answered
         except BaseException as failure:
-            self.claims.release(claim)
+            self.locks.release(request)
             if isinstance(failure, TimeoutError):
-                waited = ", ".join(sorted(claim.zones))
-                raise ReplyTimeout(f"{claim.party.name} did not get zone {waited} within {timeout:.3g} s") from None
+                waited = ", ".join(sorted(request.zones))
+                raise ReplyTimeout(f"{request.holder.name} did not get zone {waited} within {timeout:.3g} s") from None
 
             raise
 
         if error:
-            raise another(error)  # a failure may answer several claims
+            raise another(error)  # a failure may answer several requests
 
         if waits and check:
             try:
                 await check()
             except BaseException:
-                self.claims.release(claim)
+                self.locks.release(request)
                 raise
 
-        return claim
+        return request
 
     def _ended(self, task: asyncio.Task[object] | None) -> None:
         """A task moves nothing any more."""
@@ -251,4 +251,4 @@ class Zones:
             if driver is task:
                 self.drivers[arm] = None
 
-        self.claims.settle()
+        self.locks.settle()

@@ -23,9 +23,9 @@ from dobot_async.grid import place as to_place
 __all__ = [
     "AIR",
     "Check",
-    "Hand",
+    "HandlingTraits",
     "gripper_holds",
-    "hand_of",
+    "handling_traits",
     "move_straight",
     "settle_time",
     "stop_check",
@@ -46,7 +46,7 @@ Release = Callable[[Any], Awaitable[None]]
 
 
 @dataclass(frozen=True, slots=True)
-class Hand:
+class HandlingTraits:
     """What a family of arms has to be known for to handle parts.
 
     Attributes:
@@ -118,24 +118,24 @@ async def straight_ultraarm(arm: UltraArm, target: Any, *, speed: float | None =
 AIR, FINGERS = 0.3, 0.6
 """Seconds: a cup holds 0.2 s after its valve, a gripper 0.5 s, and the air is not to be the slower one for once."""
 
-HANDS: Mapping[type, Hand] = {
-    Magician: Hand(
+HANDS: Mapping[type, HandlingTraits] = {
+    Magician: HandlingTraits(
         "a Magician",
         straight_magician,
         check_magician,
         {"suction": AIR, "gripper": FINGERS},
         {"suction": lambda arm: arm.suction(False, pump=False)},
     ),
-    MyCobot: Hand(
+    MyCobot: HandlingTraits(
         "a myCobot",
         straight_mycobot,
         check_mycobot,
         {"gripper": 0.0},  # its verb returns when the fingers rest
         lacks=frozenset({"suction"}),
     ),
-    UltraArm: Hand("an ultraArm", straight_ultraarm, check_ultraarm, {"suction": AIR, "gripper": FINGERS}),
+    UltraArm: HandlingTraits("an ultraArm", straight_ultraarm, check_ultraarm, {"suction": AIR, "gripper": FINGERS}),
 }
-OTHER = Hand(
+OTHER = HandlingTraits(
     "the arm",
     straight_other,
     lambda arm, target: None,  # noqa: ARG005 - nothing is known of it
@@ -143,14 +143,14 @@ OTHER = Hand(
 )
 
 
-def hand_of(arm: object) -> Hand:
+def handling_traits(arm: object) -> HandlingTraits:
     """Return what is known of an arm; of one of another family only what `Arm` says."""
     return next((hand for kind, hand in HANDS.items() if isinstance(arm, kind)), OTHER)
 
 
 def settle_time(arm: Arm, tool: str) -> float:
     """Return how many seconds a tool ("suction", "gripper") of an arm needs once its verb has returned."""
-    return hand_of(arm).settle.get(tool, 0.0)
+    return handling_traits(arm).settle.get(tool, 0.0)
 
 
 async def move_straight(arm: Arm, where: Any, **moves: Any) -> None:
@@ -159,7 +159,7 @@ async def move_straight(arm: Arm, where: Any, **moves: Any) -> None:
     Raises:
         DobotError: As the arm's `move_to`.
     """
-    await hand_of(arm).straight(arm, target_of(where), **moves)
+    await handling_traits(arm).straight(arm, target_of(where), **moves)
 
 
 def gripper_holds(arm: MyCobot, *, least: float = CLOSED) -> Check:

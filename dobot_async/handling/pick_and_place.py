@@ -26,7 +26,7 @@ from dobot_async.handling.arms import (
     AIR,
     Check,
     gripper_holds,
-    hand_of,
+    handling_traits,
     move_straight,
     stop_check,
     target_of,
@@ -86,7 +86,7 @@ class Handling:
 
     async def switch(self, *, take: bool) -> None:
         """Let the tool take, or let go, and return when it has."""
-        release = hand_of(self.arm).release
+        release = handling_traits(self.arm).release
         self.check_stop()
         if callable(self.tool):
             await self.tool(take)
@@ -126,7 +126,7 @@ def planned(
     if not callable(tool):
         check_choice("tool", tool, "suction", "gripper")
 
-    hand = hand_of(arm)
+    hand = handling_traits(arm)
     if tool in hand.lacks:
         raise UnsupportedError(f"{hand.title} has no {tool} of its own; give a function as tool=, that switches yours")
 

@@ -42,7 +42,7 @@ AHEAD = 4  # messages of a request that are taken before they are wanted
 
 
 @dataclass(frozen=True, slots=True)
-class Guard:
+class AccessCheck:
     """Who comes in.
 
     Attributes:
@@ -66,7 +66,7 @@ class Guard:
             await answer(send, *refused)
             return
 
-        await Request(self.app).serve(scope, receive, send)
+        await HttpRequest(self.app).serve(scope, receive, send)
 
     def _refused(self, headers: list[tuple[bytes, bytes]]) -> tuple[int, str] | None:
         """The status and the reason for a request that is not let in."""
@@ -96,7 +96,7 @@ async def answer(send: Send, status: int, reason: str) -> None:
     await send({"type": "http.response.body", "body": f"{reason}\n".encode()})
 
 
-class Request:
+class HttpRequest:
     """One request, of which it is noticed at once when its client is gone.
 
     Args:
@@ -174,7 +174,7 @@ async def serve_http(
     if key and not certificate:
         raise ValueError("a key needs its certificate")
 
-    guard = Guard(app_of(server), Authenticator(token, frozenset(origins), begins=ignored, refuse=ignored), names)
+    guard = AccessCheck(app_of(server), Authenticator(token, frozenset(origins), begins=ignored, refuse=ignored), names)
     listening = listen(host, port)
     running, before = Server(config_of(guard, certificate, key)), watchers()
     serving = asyncio.create_task(running.serve([listening]), name="dobot_async mcp http")

@@ -34,7 +34,7 @@ AHEAD = 64
 """Lines that are read before they are wanted."""
 
 
-class Lines:
+class LineReader:
     """The lines of a file descriptor, read by a thread; `None` is the end.
 
     Args:
@@ -73,7 +73,7 @@ class Lines:
             self._loop.call_soon_threadsafe(self.lines.put_nowait, line)
 
 
-class Writer:
+class LineWriter:
     """Lines to a file descriptor, written by a thread.
 
     Args:
@@ -122,9 +122,9 @@ async def standard_streams(stdin: int, stdout: int) -> AsyncGenerator[Messages]:
     to_server, incoming = anyio.create_memory_object_stream[SessionMessage | Exception](0)
     outgoing, from_server = anyio.create_memory_object_stream[SessionMessage](0)
     gone = asyncio.Event()
-    writer = Writer(stdout, gone.set)
+    writer = LineWriter(stdout, gone.set)
     tasks = [
-        asyncio.create_task(take_in(Lines(stdin), to_server, gone), name="dobot_async mcp in"),
+        asyncio.create_task(take_in(LineReader(stdin), to_server, gone), name="dobot_async mcp in"),
         asyncio.create_task(hand_out(writer, from_server), name="dobot_async mcp out"),
     ]
     try:
@@ -138,7 +138,9 @@ async def standard_streams(stdin: int, stdout: int) -> AsyncGenerator[Messages]:
             stream.close()
 
 
-async def take_in(lines: Lines, to_server: ObjectSendStream[SessionMessage | Exception], gone: asyncio.Event) -> None:
+async def take_in(
+    lines: LineReader, to_server: ObjectSendStream[SessionMessage | Exception], gone: asyncio.Event
+) -> None:
     """Pass on what the client says, until it is gone."""
     leaving = asyncio.create_task(gone.wait(), name="dobot_async mcp reader gone")
     try:
@@ -166,7 +168,7 @@ async def take_in(lines: Lines, to_server: ObjectSendStream[SessionMessage | Exc
         await to_server.aclose()
 
 
-async def hand_out(writer: Writer, from_server: ObjectReceiveStream[SessionMessage]) -> None:
+async def hand_out(writer: LineWriter, from_server: ObjectReceiveStream[SessionMessage]) -> None:
     """Tell the client what the server says."""
     async with from_server:
         async for told in from_server:

@@ -29,7 +29,7 @@ FRESH = 1.0
 """Seconds for which figures are given again: who asks more often does not load the line to the arm."""
 
 
-class Page:
+class MetricsPage:
     """The page, and those who ask for it."""
 
     def __init__(self, text: Callable[[], Awaitable[bytes]], token: str | None) -> None:
@@ -126,7 +126,7 @@ async def serve_metrics(
     if token is None and not is_loopback(host):
         raise ValueError(f"metrics at {host} need a token: others than this computer's programs reach it")
 
-    page = Page(text, token)
+    page = MetricsPage(text, token)
     try:
         server = await asyncio.start_server(page.connected, host, port, limit=LONGEST)
     except OSError as error:

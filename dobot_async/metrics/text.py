@@ -18,7 +18,7 @@ MISSING = "prometheus-client is not installed, and metrics need it: pip install 
 GAUGE, COUNTER = "gauge", "counter"
 
 
-class Row(NamedTuple):
+class MetricRow(NamedTuple):
     """One metric.
 
     Attributes:
@@ -35,27 +35,27 @@ class Row(NamedTuple):
 
 
 ROWS = (
-    Row("dobot_link_up", GAUGE, "Whether the link to the arm is open.", "up"),
-    Row("dobot_link_outages", COUNTER, "How often the link was lost and reopened.", "outages"),
-    Row("dobot_link_requests", COUNTER, "Requests sent, repeated ones included.", "stats.sent"),
-    Row("dobot_link_replies", COUNTER, "Whole frames received.", "stats.received"),
-    Row("dobot_link_repeats", COUNTER, "Requests sent again.", "stats.repeated"),
-    Row("dobot_link_losses", COUNTER, "Requests that were not answered in their turn.", "stats.lost"),
-    Row("dobot_link_timeouts", COUNTER, "Calls that failed without an answer.", "stats.timeouts"),
-    Row("dobot_link_unexpected", COUNTER, "Frames that answered nothing.", "stats.unexpected"),
-    Row("dobot_link_bad_frames", COUNTER, "Frames with a wrong checksum.", "stats.bad_frames"),
-    Row("dobot_link_junk_bytes", COUNTER, "Bytes that belong to no frame.", "stats.junk_bytes"),
-    Row("dobot_link_round_trip_seconds", GAUGE, "What an answer takes on the average.", "round_trip"),
-    Row("dobot_queue_pending", GAUGE, "Accepted commands that have not ended.", "pending"),
-    Row("dobot_alarms", GAUGE, "Alarms that are set.", "alarms"),
-    Row("dobot_moving", GAUGE, "Whether the arm is in the middle of something.", "moving"),
-    Row("dobot_lease_held", GAUGE, "Whether somebody has the lease.", "held"),
-    Row("dobot_bridge_clients", GAUGE, "Clients of the bridge.", "clients"),
-    Row("dobot_bridge_stops", COUNTER, "How often something stopped the arm.", "stops"),
+    MetricRow("dobot_link_up", GAUGE, "Whether the link to the arm is open.", "up"),
+    MetricRow("dobot_link_outages", COUNTER, "How often the link was lost and reopened.", "outages"),
+    MetricRow("dobot_link_requests", COUNTER, "Requests sent, repeated ones included.", "stats.sent"),
+    MetricRow("dobot_link_replies", COUNTER, "Whole frames received.", "stats.received"),
+    MetricRow("dobot_link_repeats", COUNTER, "Requests sent again.", "stats.repeated"),
+    MetricRow("dobot_link_losses", COUNTER, "Requests that were not answered in their turn.", "stats.lost"),
+    MetricRow("dobot_link_timeouts", COUNTER, "Calls that failed without an answer.", "stats.timeouts"),
+    MetricRow("dobot_link_unexpected", COUNTER, "Frames that answered nothing.", "stats.unexpected"),
+    MetricRow("dobot_link_bad_frames", COUNTER, "Frames with a wrong checksum.", "stats.bad_frames"),
+    MetricRow("dobot_link_junk_bytes", COUNTER, "Bytes that belong to no frame.", "stats.junk_bytes"),
+    MetricRow("dobot_link_round_trip_seconds", GAUGE, "What an answer takes on the average.", "round_trip"),
+    MetricRow("dobot_queue_pending", GAUGE, "Accepted commands that have not ended.", "pending"),
+    MetricRow("dobot_alarms", GAUGE, "Alarms that are set.", "alarms"),
+    MetricRow("dobot_moving", GAUGE, "Whether the arm is in the middle of something.", "moving"),
+    MetricRow("dobot_lease_held", GAUGE, "Whether somebody has the lease.", "held"),
+    MetricRow("dobot_bridge_clients", GAUGE, "Clients of the bridge.", "clients"),
+    MetricRow("dobot_bridge_stops", COUNTER, "How often something stopped the arm.", "stops"),
 )
 
 
-class Figures:
+class MetricsCollector:
     """What a registry collects, once."""
 
     def __init__(self, arms: Mapping[str, ArmFigures]) -> None:
@@ -104,5 +104,5 @@ def metrics_text(arms: Mapping[str, ArmFigures]) -> bytes:
         raise ImportError(MISSING, name=error.name) from error
 
     registry = CollectorRegistry(auto_describe=False)
-    registry.register(Figures(arms))
+    registry.register(MetricsCollector(arms))
     return generate_latest(registry)

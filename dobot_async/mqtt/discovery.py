@@ -37,7 +37,7 @@ def discovery_of(on: RemoteArm, topics: Topics, will: str, *, joints: int, moves
     identity = f"dobot_{on.name}"
     components = {**sensors(joints), **(controls(topics) if moves else {})}
     return {
-        "device": {"identifiers": [identity], "name": on.name, "model": on.manners.title},
+        "device": {"identifiers": [identity], "name": on.name, "model": on.traits.title},
         "origin": {"name": "dobot-async"},
         "availability": [{"topic": will}, {"topic": topics.available}],
         "availability_mode": "all",

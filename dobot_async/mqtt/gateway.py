@@ -23,7 +23,7 @@ import aiomqtt
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.errors import ConnectFailed, DobotError
 from dobot_async.mqtt.broker import Broker
-from dobot_async.mqtt.desk import LONGEST, Desk
+from dobot_async.mqtt.command_handler import LONGEST, CommandHandler
 from dobot_async.mqtt.discovery import discovery_of, discovery_topic
 from dobot_async.mqtt.topics import OFFLINE, ONLINE, Topics, check_word, will_topic
 from dobot_async.remote import RemoteArm, Works, state_told
@@ -76,7 +76,7 @@ class Gateway:
         self._discovery = discovery
         self._interval = interval
         self._topics = {on.name: Topics(base, on.name) for on in site}
-        self._desks = {on.name: self._desk(on) for on in site} if site.moves else {}
+        self._handlers = {on.name: self._handler(on) for on in site} if site.moves else {}
         self._out: asyncio.Queue[tuple[str, str, bool]] = asyncio.Queue()
         self._told: dict[str, tuple[float, str]] = {}
         self._announced: set[str] = set()
@@ -107,7 +107,7 @@ class Gateway:
     @property
     def holders(self) -> Mapping[str, str | None]:
         """Which session has the lease of each arm."""
-        return {name: desk.holder for name, desk in self._desks.items()}
+        return {name: handler.holder for name, handler in self._handlers.items()}
 
     async def run(self, *, patient: bool = True) -> None:
         """Serve until this is cancelled. A broker that is lost is looked for again and again.
@@ -125,8 +125,8 @@ class Gateway:
             await self._stay_connected(patient)
         finally:
             self._works.close()
-            for desk in self._desks.values():
-                await desk.aclose()
+            for handler in self._handlers.values():
+                await handler.aclose()
 
             for watch in watches:
                 await cancel_and_join(watch)
@@ -146,8 +146,8 @@ class Gateway:
                 logger.warning("%s: %s; it is looked for again", self._broker, error)
             finally:
                 self.connected.clear()
-                for desk in self._desks.values():
-                    desk.lose()
+                for handler in self._handlers.values():
+                    handler.lose()
 
             await asyncio.sleep(delay)
             delay = min(2 * delay, SLOWEST)
@@ -176,12 +176,12 @@ class Gateway:
         self._out = asyncio.Queue()
         self._told.clear()
         self._announced.clear()
-        for name in self._desks:
+        for name in self._handlers:
             await client.subscribe(self._topics[name].do, qos=1)
 
         await client.publish(self._will, ONLINE, qos=1, retain=True)
         self.connected.set()
-        for name in self._desks:
+        for name in self._handlers:
             self._tell_lease(name)
 
         tasks = [
@@ -210,7 +210,7 @@ class Gateway:
             if message.retain or name is None:
                 logger.info("%s: a retained command is not obeyed", name)
             elif isinstance(payload, bytes) and len(payload) <= LONGEST:
-                self._desks[name].take(payload)
+                self._handlers[name].take(payload)
 
     async def _publish(self, client: aiomqtt.Client) -> None:
         """Publish what there is to tell."""
@@ -239,7 +239,7 @@ class Gateway:
         """Tell Home Assistant of an arm, once a connection."""
         if self._discovery and on.name not in self._announced:
             self._announced.add(on.name)
-            told = discovery_of(on, topics, self._will, joints=joints, moves=on.name in self._desks)
+            told = discovery_of(on, topics, self._will, joints=joints, moves=on.name in self._handlers)
             self._put(discovery_topic(self._discovery, on.name), json.dumps(told), retain=True)
 
     def _tell(self, topic: str, text: str) -> None:
@@ -251,15 +251,15 @@ class Gateway:
             self._put(topic, text, retain=True)
 
     def _tell_lease(self, name: str) -> None:
-        self._put(self._topics[name].lease, json.dumps({"holder": self._desks[name].holder}), retain=True)
+        self._put(self._topics[name].lease, json.dumps({"holder": self._handlers[name].holder}), retain=True)
 
-    def _desk(self, on: RemoteArm) -> Desk:
+    def _handler(self, on: RemoteArm) -> CommandHandler:
         topics = self._topics[on.name]
 
         def reply(session: str, told: dict[str, Any]) -> None:
             self._put(topics.reply(session), json.dumps(told), retain=False)
 
-        return Desk(self._works, on, reply, lambda: self._tell_lease(on.name))
+        return CommandHandler(self._works, on, reply, lambda: self._tell_lease(on.name))
 
     def _put(self, topic: str, text: str, *, retain: bool) -> None:
         """Have something published; who is not connected has nothing to say, and of too much the oldest is dropped."""

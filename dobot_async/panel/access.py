@@ -23,7 +23,7 @@ from urllib.parse import SplitResult, urlsplit
 
 from dobot_async.transports.network import secret
 
-__all__ = ["HEADERS", "Access", "Role", "TurnedAway", "is_loopback"]
+__all__ = ["HEADERS", "Access", "AccessDenied", "Role", "is_loopback"]
 
 SHORTEST = 12  # characters of a token
 PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
@@ -54,7 +54,7 @@ class Role(enum.Enum):
     """Move an arm, with its lease."""
 
 
-class TurnedAway(Exception):
+class AccessDenied(Exception):
     """Somebody is not let in.
 
     Attributes:
@@ -136,16 +136,16 @@ class Access:
             navigates: It asks for the page itself, to which any other page may have a link.
         """
         if not self.is_own(host):
-            raise TurnedAway(421, "this server is not called so; --name says under which names it may be called")
+            raise AccessDenied(421, "this server is not called so; --name says under which names it may be called")
 
         if origin is None and changes:
-            raise TurnedAway(403, "a browser says from which page this comes")
+            raise AccessDenied(403, "a browser says from which page this comes")
 
         if origin is not None and not same_place(origin, host):
-            raise TurnedAway(403, "another page may not do this")
+            raise AccessDenied(403, "another page may not do this")
 
         if fetched_from is not None and fetched_from not in FETCHED_FROM and not navigates:
-            raise TurnedAway(403, "another page may not do this")
+            raise AccessDenied(403, "another page may not do this")
 
     def is_own(self, host: str) -> bool:
         """Return whether a `Host` is a name of this server."""

@@ -10,93 +10,93 @@ from dobot_async._core.util.text import printable
 from dobot_async.panel import file_actions as files
 from dobot_async.panel import motion_actions as motions
 from dobot_async.panel import tool_actions as tools
+from dobot_async.panel.arm_tasks import ArmTask
 from dobot_async.panel.arms import ArmView
-from dobot_async.panel.calls import Action, Call, told_of_tools, verb
-from dobot_async.panel.works import Work
+from dobot_async.panel.requests import PageRequest, PanelAction, told_of_tools, verb
 
 __all__ = ["ACTIONS"]
 
 
-def take_lease(call: Call) -> Coroutine[Any, Any, Any]:
+def take_lease(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Take the lease, from somebody else if that is wanted."""
     takeover = call.given.flag("takeover", default=False)
     call.given.end()
     return call.station.lease.take(call.session, takeover=takeover)
 
 
-def release_lease(call: Call) -> Coroutine[Any, Any, Any]:
+def release_lease(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Give it back."""
     call.given.end()
     return call.station.lease.end(call.session, "it was given back")
 
 
-def stop(call: Call) -> Coroutine[Any, Any, Any]:
+def stop(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Stop one arm, or all."""
     if call.at:
         return call.at.stop(call.session)
 
-    return call.session.desk.stop_all(call.session)
+    return call.session.state.stop_all(call.session)
 
 
-def recover(call: Call) -> Coroutine[Any, Any, Any]:
+def recover(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Make the arm ready again."""
     whole = call.station.source.recover
 
-    async def recovered(view: ArmView, _: Work) -> None:
+    async def recovered(view: ArmView, _: ArmTask) -> None:
         await (whole() if whole else view.arm.recover())
 
     return call.work("recover", recovered)
 
 
-def set_name(call: Call) -> None:
+def set_name(call: PageRequest) -> None:
     """Say who one is."""
     name = printable(call.given.text("name").strip(), 40)
     if name:
         call.session.rename(name)
 
 
-ACTIONS: Mapping[str, Action] = {
-    "stop": Action(stop, lease="", arm=False),
-    "check": Action(motions.check, lease=""),
-    "outline": Action(motions.outline_at, lease=""),
-    "preview": Action(files.preview, lease=""),
-    "name": Action(set_name, lease="", arm=False),
-    "ping": Action(lambda _: {}, lease="", arm=False),
-    "take_lease": Action(take_lease, lease="may"),
-    "release_lease": Action(release_lease, lease="may"),
+ACTIONS: Mapping[str, PanelAction] = {
+    "stop": PanelAction(stop, lease="", arm=False),
+    "check": PanelAction(motions.check, lease=""),
+    "outline": PanelAction(motions.outline_at, lease=""),
+    "preview": PanelAction(files.preview, lease=""),
+    "name": PanelAction(set_name, lease="", arm=False),
+    "ping": PanelAction(lambda _: {}, lease="", arm=False),
+    "take_lease": PanelAction(take_lease, lease="may"),
+    "release_lease": PanelAction(release_lease, lease="may"),
     "home": verb("home", lambda view: view.arm.home()),
-    "recover": Action(recover),
-    "pause": Action(partial(told_of_tools, text="pause", do=lambda view: view.arm.pause())),
-    "resume": Action(partial(told_of_tools, text="resume", do=lambda view: view.arm.resume())),
+    "recover": PanelAction(recover),
+    "pause": PanelAction(partial(told_of_tools, text="pause", do=lambda view: view.arm.pause())),
+    "resume": PanelAction(partial(told_of_tools, text="resume", do=lambda view: view.arm.resume())),
     "power": verb("power", lambda view: view.power()),
-    "move_to": Action(motions.move_to),
-    "move_joints": Action(motions.move_joints),
-    "step": Action(motions.step),
-    "jog": Action(motions.jog),
-    "beat": Action(motions.beat),
-    "release": Action(motions.release),
-    "follow": Action(motions.follow),
-    "target": Action(motions.target),
-    "suction": Action(tools.suction),
-    "gripper": Action(tools.gripper),
-    "gripper_to": Action(tools.gripper_to),
-    "arm_laser": Action(tools.arm_laser),
-    "laser": Action(tools.laser),
-    "conveyor": Action(tools.conveyor),
-    "configure_pin": Action(tools.configure_pin),
-    "output": Action(tools.output),
-    "watch_inputs": Action(tools.watch_inputs),
-    "rail": Action(tools.rail),
-    "move_rail": Action(motions.move_rail),
-    "end_effector": Action(tools.end_effector),
-    "speed": Action(motions.speed),
-    "teach_take": Action(files.teach_take),
-    "teach_remove": Action(files.teach_remove),
-    "teach_move": Action(files.teach_move),
-    "teach_edit": Action(files.teach_edit),
-    "teach_clear": Action(files.teach_clear),
-    "teach_load": Action(files.teach_load),
-    "teach_play": Action(files.teach_play),
-    "draw": Action(files.draw),
+    "move_to": PanelAction(motions.move_to),
+    "move_joints": PanelAction(motions.move_joints),
+    "step": PanelAction(motions.step),
+    "jog": PanelAction(motions.jog),
+    "beat": PanelAction(motions.beat),
+    "release": PanelAction(motions.release),
+    "follow": PanelAction(motions.follow),
+    "target": PanelAction(motions.target),
+    "suction": PanelAction(tools.suction),
+    "gripper": PanelAction(tools.gripper),
+    "gripper_to": PanelAction(tools.gripper_to),
+    "arm_laser": PanelAction(tools.arm_laser),
+    "laser": PanelAction(tools.laser),
+    "conveyor": PanelAction(tools.conveyor),
+    "configure_pin": PanelAction(tools.configure_pin),
+    "output": PanelAction(tools.output),
+    "watch_inputs": PanelAction(tools.watch_inputs),
+    "rail": PanelAction(tools.rail),
+    "move_rail": PanelAction(motions.move_rail),
+    "end_effector": PanelAction(tools.end_effector),
+    "speed": PanelAction(motions.speed),
+    "teach_take": PanelAction(files.teach_take),
+    "teach_remove": PanelAction(files.teach_remove),
+    "teach_move": PanelAction(files.teach_move),
+    "teach_edit": PanelAction(files.teach_edit),
+    "teach_clear": PanelAction(files.teach_clear),
+    "teach_load": PanelAction(files.teach_load),
+    "teach_play": PanelAction(files.teach_play),
+    "draw": PanelAction(files.draw),
 }
 """By their words."""

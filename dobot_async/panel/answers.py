@@ -7,12 +7,12 @@ from typing import Any
 
 from aiohttp import web
 
-from dobot_async.panel.pages import Page
+from dobot_async.panel.static_files import StaticFile
 
 __all__ = ["as_json", "plain", "safe", "served"]
 
 
-def served(page: Page | None, request: web.Request) -> web.Response:
+def served(page: StaticFile | None, request: web.Request) -> web.Response:
     """Answer with a file."""
     if page is None:
         raise web.HTTPNotFound

@@ -14,9 +14,9 @@ from pathlib import PurePath
 from typing import Any
 
 from dobot_async.errors import DobotError
+from dobot_async.panel.arm_tasks import ArmTask, ArmTasks
 from dobot_async.panel.arms import ArmView
-from dobot_async.panel.problems import Refusal
-from dobot_async.panel.works import Work, Works
+from dobot_async.panel.problems import PanelRefusal
 from dobot_async.toolpath import (
     Drawing,
     Progress,
@@ -75,7 +75,7 @@ class Drawings:
         """
         read = reader_of(name, mode)
         if self._reading.locked():
-            raise Refusal("busy", "another file is being read: try again in a moment")
+            raise PanelRefusal("busy", "another file is being read: try again in a moment")
 
         await self._reading.acquire()
         work = asyncio.ensure_future(asyncio.to_thread(toolpath_of, read, data, name))
@@ -84,7 +84,7 @@ class Drawings:
             async with asyncio.timeout(LONGEST):
                 path, lines = await asyncio.shield(work)
         except TimeoutError:
-            raise Refusal("file", f"{name}: it takes more than {LONGEST:.0f} s to read; make it simpler") from None
+            raise PanelRefusal("file", f"{name}: it takes more than {LONGEST:.0f} s to read; make it simpler") from None
 
         file = f"f{next(self._numbers)}"
         self._files[file] = name, path
@@ -108,8 +108,8 @@ class Drawings:
         tool: Any,
         speed: float | None,
         first: int,
-        works: Works,
-        work: Work,
+        works: ArmTasks,
+        work: ArmTask,
     ) -> dict[str, Any]:
         """Draw a file; return when the arm has done it."""
         _, path = self._fitted(file, size)
@@ -130,7 +130,7 @@ class Drawings:
 
     def _fitted(self, file: str, size: Size) -> tuple[str, Toolpath]:
         if file not in self._files:
-            raise Refusal("file", "this file is not here any more: drop it again")
+            raise PanelRefusal("file", "this file is not here any more: drop it again")
 
         name, path = self._files[file]
         return name, path.fit(*size) if size else path

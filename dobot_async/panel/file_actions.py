@@ -6,9 +6,9 @@ from collections.abc import Coroutine, Mapping
 from typing import Any
 
 from dobot_async.panel.arguments import Arguments
+from dobot_async.panel.arm_tasks import ArmTask
 from dobot_async.panel.arms import ArmView
-from dobot_async.panel.calls import Call
-from dobot_async.panel.works import Work
+from dobot_async.panel.requests import PageRequest
 from dobot_async.toolpath import WorkPlane
 
 __all__ = [
@@ -27,41 +27,41 @@ FAR = 2000.0  # mm
 TOOLS = ("pen", "laser")
 
 
-def teach_take(call: Call) -> Coroutine[Any, Any, Any]:
+def teach_take(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Take a point."""
     taught, name = call.station.taught, call.given.text("name", "")
     mode = call.given.word("mode", call.station.view.modes) if call.given.has("mode") else None
     return call.work("take a point", lambda view, _: taught.take(view, mode=mode, name=name), beside=True)
 
 
-def teach_remove(call: Call) -> None:
+def teach_remove(call: PageRequest) -> None:
     """Take a point out."""
     call.station.taught.remove(call.given.whole("index", 0, 10_000))
 
 
-def teach_move(call: Call) -> None:
+def teach_move(call: PageRequest) -> None:
     """Put it elsewhere in the list."""
     call.station.taught.move(call.given.whole("index", 0, 10_000), call.given.whole("to", 0, 10_000))
 
 
-def teach_edit(call: Call) -> None:
+def teach_edit(call: PageRequest) -> None:
     """Change it."""
     call.station.taught.edit(call.given.whole("index", 0, 10_000), call.given.mapping("changes"))
 
 
-def teach_clear(call: Call) -> None:
+def teach_clear(call: PageRequest) -> None:
     """Begin a new list."""
     call.station.taught.set(())
 
 
-def teach_load(call: Call) -> None:
+def teach_load(call: PageRequest) -> None:
     """Take what is in a file."""
     file = call.given.text("file")
     call.given.end()
     call.station.taught.load(file)
 
 
-def teach_play(call: Call) -> Coroutine[Any, Any, Any]:
+def teach_play(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Let the arm do it."""
     loops = call.given.number_or_none("loops", 1, 10_000, 1)
     options = {
@@ -72,7 +72,7 @@ def teach_play(call: Call) -> Coroutine[Any, Any, Any]:
     return call.work("play", lambda view, work: call.station.taught.play(view, work, **options), alone=True)
 
 
-def plane_of(call: Call) -> WorkPlane:
+def plane_of(call: PageRequest) -> WorkPlane:
     """Return where the paper lies."""
     given = Arguments(call.given.mapping("plane"))
     x, y, z = (given.number(axis, -FAR, FAR) for axis in "xyz")
@@ -82,7 +82,7 @@ def plane_of(call: Call) -> WorkPlane:
     return WorkPlane.flat(x, y, z, rotation=rotation, lift=lift, press=press)
 
 
-def size_of(call: Call) -> tuple[float, float] | None:
+def size_of(call: PageRequest) -> tuple[float, float] | None:
     """Return how large the drawing is to be; None leaves it."""
     found = call.given.numbers("size", {2}, optional=True)
     if found is None:
@@ -94,17 +94,17 @@ def size_of(call: Call) -> tuple[float, float] | None:
     return found[0], found[1]
 
 
-def preview(call: Call) -> Coroutine[Any, Any, Any]:
+def preview(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Show a drawing at a place."""
     file, plane, size = call.given.text("file"), plane_of(call), size_of(call)
     tool = call.given.word("tool", TOOLS, "pen")
     call.given.end()
-    return call.session.desk.drawings.preview(call.station.view, file, plane, size, tool)
+    return call.session.state.drawings.preview(call.station.view, file, plane, size, tool)
 
 
-def draw(call: Call) -> Coroutine[Any, Any, Any]:
+def draw(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Draw it."""
-    station, drawings = call.station, call.session.desk.drawings
+    station, drawings = call.station, call.session.state.drawings
     file, plane, size = call.given.text("file"), plane_of(call), size_of(call)
     tool = call.given.word("tool", TOOLS, "pen")
     options: dict[str, Any] = {
@@ -116,7 +116,7 @@ def draw(call: Call) -> Coroutine[Any, Any, Any]:
     if tool == "laser":
         station.check_armed()
 
-    async def drawn(view: ArmView, work: Work) -> Mapping[str, Any]:
+    async def drawn(view: ArmView, work: ArmTask) -> Mapping[str, Any]:
         return await drawings.draw(view, file, plane, size, **options, work=work)
 
     return call.work("engrave" if tool == "laser" else "draw", drawn, alone=True)

@@ -10,12 +10,12 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
-from dobot_async.panel.problems import Refusal
+from dobot_async.panel.problems import PanelRefusal
 
-__all__ = ["Lease", "Party"]
+__all__ = ["Operator", "OperatorLease"]
 
 
-class Party(Protocol):
+class Operator(Protocol):
     """Somebody who may have it.
 
     Attributes:
@@ -29,7 +29,7 @@ class Party(Protocol):
     yields: bool
 
 
-class Lease:
+class OperatorLease:
     """See the module.
 
     Args:
@@ -45,7 +45,7 @@ class Lease:
     def __init__(
         self, begin: Callable[[], Awaitable[None]], end: Callable[[], Awaitable[None]], changed: Callable[[str], None]
     ) -> None:
-        self.holder: Party | None = None
+        self.holder: Operator | None = None
         self.freed = asyncio.Event()
         self.freed.set()
         self._begin = begin
@@ -53,46 +53,46 @@ class Lease:
         self._changed = changed
         self._changing = asyncio.Lock()
 
-    async def take(self, party: Party, *, takeover: bool = False) -> None:
+    async def take(self, operator: Operator, *, takeover: bool = False) -> None:
         """Return when somebody has it; raise Refusal if somebody else keeps it."""
         async with self._changing:
             holder = self.holder
-            if holder is party:
+            if holder is operator:
                 return
 
             if holder and not (takeover and holder.yields):
                 can = "" if holder.yields else ", which does not yield to a page"
-                raise Refusal("lease", f"{holder.name} moves the arm{can}")
+                raise PanelRefusal("lease", f"{holder.name} moves the arm{can}")
 
             if holder:
-                await self._release(holder, f"{party.name} takes over from {holder.name}")
+                await self._release(holder, f"{operator.name} takes over from {holder.name}")
 
-            if party.gone:
-                raise Refusal("lease", f"{party.name} has gone")
+            if operator.gone:
+                raise PanelRefusal("lease", f"{operator.name} has gone")
 
             await self._begin()
-            if party.gone:
-                raise Refusal("lease", f"{party.name} has gone")
+            if operator.gone:
+                raise PanelRefusal("lease", f"{operator.name} has gone")
 
-            self.holder = party
+            self.holder = operator
             self.freed.clear()
-            self._changed(f"{party.name} moves the arm from now on")
+            self._changed(f"{operator.name} moves the arm from now on")
 
-    async def end(self, party: Party, why: str) -> None:
+    async def end(self, operator: Operator, why: str) -> None:
         """End the lease of somebody, if he has it."""
         async with self._changing:
-            if self.holder is party:
-                await self._release(party, why)
+            if self.holder is operator:
+                await self._release(operator, why)
 
-    def check(self, party: Party) -> None:
+    def check(self, operator: Operator) -> None:
         """Raise Refusal if somebody does not have it."""
         if self.holder is None:
-            raise Refusal("lease", "take the lease of the arm first")
+            raise PanelRefusal("lease", "take the lease of the arm first")
 
-        if self.holder is not party:
-            raise Refusal("lease", f"{self.holder.name} moves the arm")
+        if self.holder is not operator:
+            raise PanelRefusal("lease", f"{self.holder.name} moves the arm")
 
-    async def _release(self, holder: Party, why: str) -> None:
+    async def _release(self, holder: Operator, why: str) -> None:
         """Let nothing begin any more, end what goes on, and let others have it."""
         self.holder = None
         try:

@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 
 from dobot_async._core.util.text import printable
 from dobot_async.errors import DobotError
+from dobot_async.panel.arm_tasks import ArmTask
 from dobot_async.panel.arms import ArmView
-from dobot_async.panel.calls import Call
-from dobot_async.panel.holding import Hold, held
-from dobot_async.panel.problems import Refusal
+from dobot_async.panel.hold_to_run import HoldToRun, held
+from dobot_async.panel.problems import PanelRefusal
 from dobot_async.panel.reach import outline
-from dobot_async.panel.works import Work
+from dobot_async.panel.requests import PageRequest
 
 __all__ = [
     "beat",
@@ -38,7 +38,7 @@ FOLLOWING = -1
 """In place of the number of a press."""
 
 
-def place_of(call: Call) -> dict[str, float]:
+def place_of(call: PageRequest) -> dict[str, float]:
     """Return the coordinates that were given, by their names."""
     axes = call.station.view.axes
     place = {axis: call.given.number(axis, -FAR, FAR) for axis in axes if call.given.has(axis)}
@@ -48,7 +48,7 @@ def place_of(call: Call) -> dict[str, float]:
     return place
 
 
-def joints_of(call: Call) -> list[float]:
+def joints_of(call: PageRequest) -> list[float]:
     """Return the joints that were given."""
     count = len(call.station.view.joint_limits)
     found = call.given.numbers("joints", {count})
@@ -56,7 +56,7 @@ def joints_of(call: Call) -> list[float]:
     return found
 
 
-def check(call: Call) -> Mapping[str, Any]:
+def check(call: PageRequest) -> Mapping[str, Any]:
     """Tell whether a place, or joints, can be reached."""
     view = call.station.view
     try:
@@ -72,7 +72,7 @@ def check(call: Call) -> Mapping[str, Any]:
     return {"ok": True, "problem": ""}
 
 
-def outline_at(call: Call) -> Coroutine[Any, Any, Any]:
+def outline_at(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Tell what can be reached at a height."""
     view, height = call.station.view, call.given.number("z", -FAR, FAR)
     call.given.end()
@@ -83,7 +83,7 @@ def outline_at(call: Call) -> Coroutine[Any, Any, Any]:
     return found()
 
 
-def move_to(call: Call) -> Coroutine[Any, Any, Any]:
+def move_to(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Move the tool."""
     line, place = call.given.flag("line", default=False), place_of(call)
     call.station.view.check_place(place, call.station.pose)
@@ -91,7 +91,7 @@ def move_to(call: Call) -> Coroutine[Any, Any, Any]:
     return call.work(text, lambda view, _: view.move_to(place, line=line))
 
 
-def move_joints(call: Call) -> Coroutine[Any, Any, Any]:
+def move_joints(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Move the joints."""
     joints = joints_of(call)
     call.station.view.check_joints(joints)
@@ -99,23 +99,27 @@ def move_joints(call: Call) -> Coroutine[Any, Any, Any]:
     return call.work(text, lambda view, _: view.move_joints(joints))
 
 
-def step(call: Call) -> Coroutine[Any, Any, Any]:
+def step(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Go one step."""
     direction, size = call.given.word("direction", call.station.view.words), call.given.number("size", 0.01, 100.0)
     return call.work(f"step {direction} {size:g}", lambda view, _: view.step(direction, size))
 
 
-def new_hold(call: Call, press: int) -> Hold:
+def new_hold(call: PageRequest, press: int) -> HoldToRun:
     """Return a hold for a press that is new, and that comes from a hand that holds now."""
-    ticks = call.session.desk.ticks
+    ticks = call.session.state.ticks
     if not ticks.is_new(call.given.whole("tick", 0, 2**53)):
-        raise Refusal("late", "this press is older than 0.3 s: the line to this page is too slow")
+        raise PanelRefusal("late", "this press is older than 0.3 s: the line to this page is too slow")
 
-    return Hold(ticks, press)
+    return HoldToRun(ticks, press)
 
 
 async def hold_on(
-    call: Call, kind: str, hold: Hold, block: Callable[[], AbstractAsyncContextManager[T]], begun: Callable[[T], None]
+    call: PageRequest,
+    kind: str,
+    hold: HoldToRun,
+    block: Callable[[], AbstractAsyncContextManager[T]],
+    begun: Callable[[T], None],
 ) -> Mapping[str, str]:
     """Move the arm as long as a hand holds; tell the page when that is over, and why."""
     station, why = call.station, "stopped"
@@ -133,7 +137,9 @@ async def hold_on(
     return {"why": why}
 
 
-def begin_to_hold(call: Call, hold: Hold, begin: Callable[[], Coroutine[Any, Any, Any]]) -> Coroutine[Any, Any, Any]:
+def begin_to_hold(
+    call: PageRequest, hold: HoldToRun, begin: Callable[[], Coroutine[Any, Any, Any]]
+) -> Coroutine[Any, Any, Any]:
     """Begin with a hold, at once or, if something else was held, when that has ended; beats count from now on."""
     station, going = call.station, call.station.works.alone
     held_before = list(station.holds.values())
@@ -157,7 +163,7 @@ def begin_to_hold(call: Call, hold: Hold, begin: Callable[[], Coroutine[Any, Any
     return after()
 
 
-def jog(call: Call) -> Coroutine[Any, Any, Any]:
+def jog(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Jog while beats come."""
     station, session = call.station, call.session
     direction = call.given.word("direction", station.view.words)
@@ -169,18 +175,18 @@ def jog(call: Call) -> Coroutine[Any, Any, Any]:
     def begun(_: None) -> None:
         session.tell("jog", arm=station.name, press=press, state="moving", why="")
 
-    def doing(view: ArmView, _: Work) -> Coroutine[Any, Any, Any]:
+    def doing(view: ArmView, _: ArmTask) -> Coroutine[Any, Any, Any]:
         return hold_on(call, "jog", hold, lambda: view.jogging(direction, percent), begun)
 
     return begin_to_hold(call, hold, lambda: call.work(f"jog {direction}", doing, alone=True))
 
 
-def press_of(call: Call) -> int:
+def press_of(call: PageRequest) -> int:
     """Return which press is meant; a following has no number."""
     return call.given.whole("press", FOLLOWING, 2**53, FOLLOWING)
 
 
-def beat(call: Call) -> None:
+def beat(call: PageRequest) -> None:
     """It is still held."""
     hold, tick = call.station.holds.get(press_of(call)), call.given.whole("tick", 0, 2**53)
     call.given.end()
@@ -188,7 +194,7 @@ def beat(call: Call) -> None:
         hold.beat(tick)
 
 
-def release(call: Call) -> None:
+def release(call: PageRequest) -> None:
     """It is held no more."""
     hold = call.station.holds.get(press_of(call))
     call.given.end()
@@ -196,7 +202,7 @@ def release(call: Call) -> None:
         hold.end("released")
 
 
-def follow(call: Call) -> Coroutine[Any, Any, Any]:
+def follow(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Follow targets while they come; the answer comes when the arm is ready."""
     station = call.station
     speed, hold = call.given.number("max_speed", 1, FASTEST_FOLLOW, 100), new_hold(call, FOLLOWING)
@@ -207,7 +213,7 @@ def follow(call: Call) -> Coroutine[Any, Any, Any]:
         station.follow = found
         ready.set_result(None)
 
-    async def followed(view: ArmView, _: Work) -> None:
+    async def followed(view: ArmView, _: ArmTask) -> None:
         try:
             await hold_on(call, "follow", hold, lambda: view.following(speed), begun)
         finally:
@@ -220,14 +226,14 @@ def follow(call: Call) -> Coroutine[Any, Any, Any]:
         await asyncio.wait({going, ready}, return_when=asyncio.FIRST_COMPLETED)
         if not ready.done():
             await going
-            raise Refusal("late", "it was released before the arm was ready")
+            raise PanelRefusal("late", "it was released before the arm was ready")
 
         going.add_done_callback(lambda task: None if task.cancelled() else task.exception())
 
     return begin()
 
 
-def target(call: Call) -> None:
+def target(call: PageRequest) -> None:
     """Go on to a target."""
     station = call.station
     numbers, tick = (
@@ -246,13 +252,13 @@ def target(call: Call) -> None:
         raise
 
 
-def speed(call: Call) -> Coroutine[Any, Any, Any]:
+def speed(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Set how fast motions are."""
     percent = call.given.number("percent", 1, 100)
     return call.work(f"speed {percent:g} %", lambda view, _: view.set_speed(percent))
 
 
-def move_rail(call: Call) -> Coroutine[Any, Any, Any]:
+def move_rail(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Drive along the rail."""
     mm = call.given.number("mm", 0, FAR)
     return call.work(f"along the rail to {mm:g}", lambda view, _: view.move_rail(mm))

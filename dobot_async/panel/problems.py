@@ -19,7 +19,7 @@ from dobot_async.errors import (
     UnsupportedError,
 )
 
-__all__ = ["Refusal", "told"]
+__all__ = ["PanelRefusal", "told"]
 
 logger = logging.getLogger("dobot_async.panel")
 LONGEST = 2000  # characters of a message
@@ -41,7 +41,7 @@ KINDS: tuple[tuple[type[BaseException], str], ...] = (
 """The kind of each error; the first that fits counts."""
 
 
-class Refusal(Exception):
+class PanelRefusal(Exception):
     """Something is not done; nothing was sent to the arm.
 
     Attributes:
@@ -55,7 +55,7 @@ class Refusal(Exception):
 
 def told(error: BaseException) -> Mapping[str, Any]:
     """Return what a page is told of an error; what nobody expects goes to the log with its traceback."""
-    if isinstance(error, Refusal):
+    if isinstance(error, PanelRefusal):
         return {"kind": error.kind, "text": printable(str(error), LONGEST)}
 
     for kind, word in KINDS:

@@ -17,14 +17,14 @@ from dobot_async.bridge.limits import Allowance
 from dobot_async.panel.access import Role
 from dobot_async.panel.actions import ACTIONS
 from dobot_async.panel.arguments import Arguments
-from dobot_async.panel.calls import Call
 from dobot_async.panel.messages import Outlet, as_json
-from dobot_async.panel.problems import Refusal, told
+from dobot_async.panel.problems import PanelRefusal, told
+from dobot_async.panel.requests import PageRequest
 
 if TYPE_CHECKING:
-    from dobot_async.panel.desk import Desk
+    from dobot_async.panel.state import PanelState
 
-__all__ = ["Session"]
+__all__ = ["PageSession"]
 
 logger = logging.getLogger("dobot_async.panel")
 RATE, BURST = 100.0, 200.0  # messages a second
@@ -32,11 +32,11 @@ MOST_TASKS = 64
 STOPPED = {"kind": "stopped", "text": "it was stopped before it was done"}
 
 
-class Session:
+class PageSession:
     """See the module; a `Party` of leases.
 
     Attributes:
-        desk: What it shares with others.
+        state: What it shares with others.
         role: What it may do.
         name: Who it is, for people.
         gone: Its connection has ended.
@@ -44,8 +44,8 @@ class Session:
         outlet: What waits to be sent.
     """
 
-    def __init__(self, desk: Desk, role: Role, name: str) -> None:
-        self.desk = desk
+    def __init__(self, state: PanelState, role: Role, name: str) -> None:
+        self.state = state
         self.role = role
         self.name = self._first_name = name
         self.gone = False
@@ -82,7 +82,7 @@ class Session:
     def check_press(self, press: int) -> None:
         """Raise Refusal for a press that is not newer than the last one."""
         if press <= self._press:
-            raise Refusal("late", f"press {press} is over: the last one was {self._press}")
+            raise PanelRefusal("late", f"press {press} is over: the last one was {self._press}")
 
         self._press = press
 
@@ -96,7 +96,7 @@ class Session:
             return
 
         self.gone = True
-        stations = self.desk.stations.values()
+        stations = self.state.stations.values()
         held = [station for station in stations if station.lease.holder is self]
         for station in held:  # at once: the rest may have to wait for others
             station.let_go("left")
@@ -104,7 +104,7 @@ class Session:
 
         await asyncio.gather(*(station.lease.end(self, "its page has gone") for station in stations))
         await asyncio.gather(*(cancel_and_join(task) for task in list(self._tasks)))
-        self.desk.leave(self)
+        self.state.leave(self)
         self.outlet.close()
 
     def _do(self, number: int | None, message: dict[str, Any]) -> None:
@@ -112,23 +112,23 @@ class Session:
         word = message.pop("do", None)
         action = ACTIONS.get(word) if isinstance(word, str) else None
         if action is None:
-            raise Refusal("wrong", "there is no such thing to do")
+            raise PanelRefusal("wrong", "there is no such thing to do")
 
         if action.lease and self.role is not Role.OPERATOR:
-            raise Refusal("role", "viewers look on, and stop; they do not move the arm")
+            raise PanelRefusal("role", "viewers look on, and stop; they do not move the arm")
 
         named = "arm" in message
-        station = self.desk.station(message.pop("arm")) if named else None
+        station = self.state.station(message.pop("arm")) if named else None
         if station is None and action.arm:
-            raise Refusal("wrong", "say which arm")
+            raise PanelRefusal("wrong", "say which arm")
 
         if action.lease == "held" and station:
             station.lease.check(self)
 
         if len(self._tasks) >= MOST_TASKS:
-            raise Refusal("rate", f"{MOST_TASKS} things are under way: wait for their answers")
+            raise PanelRefusal("rate", f"{MOST_TASKS} things are under way: wait for their answers")
 
-        call = Call(self, station, Arguments(message), number)
+        call = PageRequest(self, station, Arguments(message), number)
         found = action.run(call)
         if is_coroutine(found):
             self._spawn(number, found)

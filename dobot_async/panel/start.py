@@ -17,14 +17,14 @@ from typing import Any
 from dobot_async import Arm, ConnectFailed, Fleet
 from dobot_async._core.util.events import Events
 from dobot_async._core.util.tasks import cancel_and_join, run_shielded
-from dobot_async.bridge.doors import served_with
 from dobot_async.bridge.handshake import HANDSHAKE
+from dobot_async.bridge.listeners import served_with
 from dobot_async.fleet.member import Member
 from dobot_async.panel.access import Access, Role, is_loopback
-from dobot_async.panel.desk import Desk
-from dobot_async.panel.lease import Lease
-from dobot_async.panel.scenery import show_scene
+from dobot_async.panel.lease import OperatorLease
+from dobot_async.panel.scene import show_scene
 from dobot_async.panel.sources import sources_of
+from dobot_async.panel.state import PanelState
 from dobot_async.simulator.scene import Scene
 
 __all__ = ["Panel", "panel"]
@@ -42,11 +42,11 @@ class Panel:
         secure: Whether it speaks TLS.
     """
 
-    def __init__(self, desk: Desk, access: Access, host: str, port: int, *, secure: bool) -> None:
+    def __init__(self, state: PanelState, access: Access, host: str, port: int, *, secure: bool) -> None:
         self.host = host
         self.port = port
         self.secure = secure
-        self._desk = desk
+        self._state = state
         self._access = access
 
     @property
@@ -76,12 +76,12 @@ class Panel:
     @property
     def events(self) -> Events[Mapping[str, Any]]:
         """What happens, in lines: each with `time` (of the clock on the wall), `text` and `level`."""
-        return self._desk.hub.lines
+        return self._state.hub.lines
 
     @property
     def pages(self) -> int:
         """How many pages are connected."""
-        return len(self._desk.sessions)
+        return len(self._state.sessions)
 
     def holder(self, name: str | None = None) -> str | None:
         """Return who moves an arm, None while nobody does.
@@ -119,8 +119,8 @@ class Panel:
         finally:
             await run_shielded(lease.end(program, "the program gives it back"))
 
-    def _lease(self, name: str | None) -> Lease:
-        stations = self._desk.stations
+    def _lease(self, name: str | None) -> OperatorLease:
+        stations = self._state.stations
         if name is None and len(stations) == 1:
             name = next(iter(stations))
 
@@ -198,23 +198,23 @@ async def panel(
         listener.close()
         raise
 
-    desk = Desk(sources, zones, scene=scene is not None, stop_all=fleet.stop if fleet else None)
-    web = web_of(desk, access)
+    state = PanelState(sources, zones, scene=scene is not None, stop_all=fleet.stop if fleet else None)
+    web = web_of(state, access)
     async with AsyncExitStack() as stack:
         stack.push_async_callback(lambda: run_shielded(web.aclose()))
-        stack.push_async_callback(lambda: run_shielded(desk.aclose()))
+        stack.push_async_callback(lambda: run_shielded(state.aclose()))
         stack.callback(listener.close)
         factory = await web.start()
         server = await asyncio.get_running_loop().create_server(
             factory, sock=listener, ssl=tls, ssl_handshake_timeout=HANDSHAKE if tls else None
         )
         stack.callback(server.close)
-        desk.start()
+        state.start()
         if scene is not None:
-            showing = asyncio.create_task(show_scene(scene, desk.hub), name="dobot_async panel scene")
+            showing = asyncio.create_task(show_scene(scene, state.hub), name="dobot_async panel scene")
             stack.push_async_callback(partial(cancel_and_join, showing))
 
-        yield Panel(desk, access, host, bound, secure=tls is not None)
+        yield Panel(state, access, host, bound, secure=tls is not None)
 
 
 def imported() -> type[Any]:

@@ -22,15 +22,15 @@ from dobot_async import LinkState
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async._core.util.text import printable
 from dobot_async.errors import DobotError
+from dobot_async.panel.arm_tasks import ArmTask, ArmTasks
 from dobot_async.panel.arms import ArmView, view_of
-from dobot_async.panel.holding import Hold
-from dobot_async.panel.lease import Lease, Party
+from dobot_async.panel.hold_to_run import HoldToRun
+from dobot_async.panel.lease import Operator, OperatorLease
 from dobot_async.panel.messages import Hub
-from dobot_async.panel.problems import Refusal
+from dobot_async.panel.poller import ArmPoller
+from dobot_async.panel.problems import PanelRefusal
 from dobot_async.panel.sources import Source
-from dobot_async.panel.taught import Taught
-from dobot_async.panel.watching import Watch
-from dobot_async.panel.works import Work, Works
+from dobot_async.panel.taught_list import Taught
 
 __all__ = ["Station"]
 
@@ -59,10 +59,10 @@ class Station:
         self.name = name
         self.source = source
         self.hub = hub
-        self.lease = Lease(self._begin_lease, self._end_lease, self._lease_changed)
-        self.works = Works(self._works_changed)
+        self.lease = OperatorLease(self._begin_lease, self._end_lease, self._lease_changed)
+        self.works = ArmTasks(self._works_changed)
         self.taught = Taught(self)
-        self.holds: dict[int, Hold] = {}
+        self.holds: dict[int, HoldToRun] = {}
         self.follow: Any = None
         self.armed_until = 0.0
         self.watched_inputs: tuple[int, ...] = ()
@@ -74,14 +74,14 @@ class Station:
         self._there = asyncio.Event()
         self._darkening: asyncio.Task[None] | None = None
         self._stops: set[asyncio.Task[None]] = set()
-        self._watch = Watch(self)
+        self._watch = ArmPoller(self)
         self._wrote = False
 
     @property
     def view(self) -> ArmView:
         """The arm; raises Refusal while it is not connected."""
         if self._view is None:
-            raise Refusal("link", f"{self.name} is not connected")
+            raise PanelRefusal("link", f"{self.name} is not connected")
 
         return self._view
 
@@ -150,7 +150,7 @@ class Station:
         for each in self.holds.values():
             each.end(why)
 
-    def start(self, work: Work, doing: Callable[[ArmView], Awaitable[Any]], owner: Party) -> asyncio.Task[Any]:
+    def start(self, work: ArmTask, doing: Callable[[ArmView], Awaitable[Any]], owner: Operator) -> asyncio.Task[Any]:
         """Begin something that moves the arm, for who has the lease; raise Refusal if that cannot be now."""
         self.lease.check(owner)
         view, self._wrote = self.view, True
@@ -160,7 +160,7 @@ class Station:
 
         return self.works.start(work, done())
 
-    async def stop(self, by: Party) -> None:
+    async def stop(self, by: Operator) -> None:
         """Stop the arm now, for anybody; that of somebody else ends the lease of who has it.
 
         Raises:
@@ -199,7 +199,7 @@ class Station:
     def check_armed(self) -> None:
         """Raise Refusal while the laser is not allowed."""
         if self._now() >= self.armed_until:
-            raise Refusal("wrong", "arm the laser first, and wear the glasses")
+            raise PanelRefusal("wrong", "arm the laser first, and wear the glasses")
 
     @property
     def armed(self) -> float:
@@ -256,7 +256,7 @@ class Station:
         try:
             await view.begin()
         except DobotError as error:
-            raise Refusal("lease", f"the arm does not take it; does another program move it? {error}") from error
+            raise PanelRefusal("lease", f"the arm does not take it; does another program move it? {error}") from error
 
     async def _end_lease(self) -> None:
         """The arm stands, and nothing burns or turns; what was set for jogs is set back."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Coroutine
 from typing import Any
 
+from dobot_async.panel.arm_tasks import ArmTask
 from dobot_async.panel.arms import ArmView
-from dobot_async.panel.calls import Call, told_of_tools
-from dobot_async.panel.problems import Refusal
-from dobot_async.panel.works import Work
+from dobot_async.panel.problems import PanelRefusal
+from dobot_async.panel.requests import PageRequest, told_of_tools
 
 __all__ = [
     "arm_laser",
@@ -28,18 +28,18 @@ LONGEST_ARMED = 60.0  # seconds
 TOOLS = ("suction", "gripper", "pen", "laser")
 
 
-def arm_laser(call: Call) -> None:
+def arm_laser(call: PageRequest) -> None:
     """Allow the laser for a time."""
     seconds = call.given.number("seconds", 1, LONGEST_ARMED)
     call.given.end()
     if "laser" not in call.station.view.features:
-        raise Refusal("unsupported", f"{call.station.view.title} has no laser")
+        raise PanelRefusal("unsupported", f"{call.station.view.title} has no laser")
 
     call.station.log(f"{call.session.name} arms the laser for {seconds:g} s", "warning")
     call.station.arm_laser(seconds)
 
 
-def laser(call: Call) -> Coroutine[Any, Any, Any]:
+def laser(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Switch the laser, on only while it is armed."""
     on = call.given.flag("on")
     if on:
@@ -48,43 +48,43 @@ def laser(call: Call) -> Coroutine[Any, Any, Any]:
     return told_of_tools(call, f"laser {'on' if on else 'off'}", lambda view: view.laser(on=on))
 
 
-def suction(call: Call) -> Coroutine[Any, Any, Any]:
+def suction(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Suck, or let go."""
     on = call.given.flag("on")
     return told_of_tools(call, f"suction {'on' if on else 'off'}", lambda view: view.suction(on=on))
 
 
-def gripper(call: Call) -> Coroutine[Any, Any, Any]:
+def gripper(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Close or open the gripper."""
     closed = call.given.flag("closed")
     return told_of_tools(call, f"{'close' if closed else 'open'} the gripper", lambda view: view.gripper(closed=closed))
 
 
-def gripper_to(call: Call) -> Coroutine[Any, Any, Any]:
+def gripper_to(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Open it partly."""
     percent = call.given.number("percent", 0, 100)
     return told_of_tools(call, f"open the gripper to {percent:g} %", lambda view: view.gripper_to(percent))
 
 
-def conveyor(call: Call) -> Coroutine[Any, Any, Any]:
+def conveyor(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Run a belt."""
     speed, motor = call.given.whole("speed", -100_000, 100_000), call.given.whole("motor", 0, 1, 0)
     return told_of_tools(call, f"belt at {speed} pulses/s", lambda view: view.conveyor(speed, motor))
 
 
-def configure_pin(call: Call) -> Coroutine[Any, Any, Any]:
+def configure_pin(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Say what a pin is for."""
     pin, use = call.given.whole("pin", 1, 64), call.given.word("use", ("input", "output"))
     return told_of_tools(call, f"pin {pin} is an {use}", lambda view: view.configure_pin(pin, use))
 
 
-def output(call: Call) -> Coroutine[Any, Any, Any]:
+def output(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Set an output."""
     pin, level = call.given.whole("pin", 1, 64), call.given.flag("level")
     return told_of_tools(call, f"output {pin} {'high' if level else 'low'}", lambda view: view.output(pin, level=level))
 
 
-def watch_inputs(call: Call) -> Coroutine[Any, Any, Any]:
+def watch_inputs(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Read some inputs from now on."""
     numbers = call.given.numbers("pins", range(9)) or []
     known = call.station.view.pins["inputs"]
@@ -101,18 +101,18 @@ def watch_inputs(call: Call) -> Coroutine[Any, Any, Any]:
     return told_of_tools(call, "look at inputs", looked)
 
 
-def rail(call: Call) -> Coroutine[Any, Any, Any]:
+def rail(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Declare the rail."""
     on = call.given.flag("on")
 
-    async def declared(view: ArmView, _: Work) -> None:
+    async def declared(view: ArmView, _: ArmTask) -> None:
         await view.rail(on=on)
         call.station.described()
 
     return call.work(f"rail {'on' if on else 'off'}", declared)
 
 
-def end_effector(call: Call) -> Coroutine[Any, Any, Any]:
+def end_effector(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Say which tool is on the arm."""
     tool = call.given.word("tool", TOOLS)
     return call.work(f"tool: {tool}", lambda view, _: view.end_effector(tool))

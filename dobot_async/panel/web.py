@@ -18,15 +18,15 @@ from dobot_async._core.util.tasks import cancel_and_join, run_shielded
 from dobot_async._core.util.text import printable
 from dobot_async.bridge.limits import Allowance
 from dobot_async.metrics import CONTENT_TYPE
-from dobot_async.panel.access import HEADERS, Access, Role, TurnedAway
+from dobot_async.panel.access import HEADERS, Access, AccessDenied, Role
 from dobot_async.panel.answers import as_json, plain, safe, served
-from dobot_async.panel.desk import Desk
-from dobot_async.panel.doorkeeper import Doorkeeper
 from dobot_async.panel.drawings import MODES
-from dobot_async.panel.figures import panel_metrics
-from dobot_async.panel.pages import Pages
-from dobot_async.panel.problems import Refusal, told
-from dobot_async.panel.session import Session
+from dobot_async.panel.metrics import panel_metrics
+from dobot_async.panel.pending_connections import PendingConnections
+from dobot_async.panel.problems import PanelRefusal, told
+from dobot_async.panel.session import PageSession
+from dobot_async.panel.state import PanelState
+from dobot_async.panel.static_files import StaticFiles
 
 __all__ = ["Web"]
 
@@ -56,19 +56,19 @@ class Web:
     """See the module.
 
     Args:
-        desk: What is behind it.
+        state: What is behind it.
         access: Who may come in.
     """
 
-    def __init__(self, desk: Desk, access: Access) -> None:
-        self._desk = desk
+    def __init__(self, state: PanelState, access: Access) -> None:
+        self._state = state
         self._access = access
-        self._pages = Pages(STATIC)
+        self._pages = StaticFiles(STATIC)
         now = asyncio.get_running_loop().time
         self._uploads = Allowance(UPLOADS, now, most=UPLOAD_BURST)
         self._lines = Allowance(TOLD, now, most=TOLD_BURST)
         self._left_out = 0
-        self._keeper: Doorkeeper | None = None
+        self._keeper: PendingConnections | None = None
         self._app = web.Application(middlewares=[self._guard], client_max_size=LARGEST_FILE)
         self._app.add_routes(
             [
@@ -95,7 +95,7 @@ class Web:
         await self._runner.setup()
         server = self._runner.server
         assert server
-        self._keeper = Doorkeeper(server, self._turned_away)
+        self._keeper = PendingConnections(server, self._turned_away)
         return self._keeper
 
     async def aclose(self) -> None:
@@ -112,11 +112,11 @@ class Web:
             response = await self._let_in(request, handler)
         except web.HTTPException as error:
             response = plain(error.status, f"{error.reason}\n")
-        except TurnedAway as error:
+        except AccessDenied as error:
             self._turned_away(request.remote or "?", str(error))
             response = plain(error.status, f"{error.words}\n")
             response.force_close()
-        except (Refusal, ValueError, ImportError) as error:
+        except (PanelRefusal, ValueError, ImportError) as error:
             what = told(error)
             response = as_json({"error": what}, STATUS.get(what["kind"], 400))
 
@@ -130,7 +130,7 @@ class Web:
         headers, access = request.headers, self._access
         opens, navigates = request.path == "/ws", request.path == "/" and request.method == "GET"
         if len(headers.getall("Host", [])) != 1 or len(headers.getall("Origin", [])) > 1:
-            raise TurnedAway(400, "one Host, and one Origin")
+            raise AccessDenied(400, "one Host, and one Origin")
 
         access.check(
             headers["Host"],
@@ -147,26 +147,26 @@ class Web:
         return await handler(request)
 
     def _role(self, request: web.Request) -> Role:
-        """Return what who asks may do; raise TurnedAway for strangers."""
+        """Return what who asks may do; raise AccessDenied for who is not known."""
         role = self._access.role_of_cookie(request.cookies.get(self._access.cookie_name, ""))
         if role is None and request.path == METRICS:  # Prometheus has no cookies
             role = self._access.role_of_token(request.headers.get("Authorization", "").removeprefix("Bearer "))
 
         if role is None:
-            raise TurnedAway(401, "it has no cookie", NOT_IN)
+            raise AccessDenied(401, "it has no cookie", NOT_IN)
 
         return role
 
     def _check_operator(self, request: web.Request) -> None:
         """Raise Refusal for viewers."""
         if self._role(request) is not Role.OPERATOR:
-            raise Refusal("role", "viewers look on, and stop")
+            raise PanelRefusal("role", "viewers look on, and stop")
 
     def _welcome(self, token: str, request: web.Request) -> web.Response:
         """Give who has a token its cookie; the page comes by a request of its own, for which that counts."""
         role = self._access.role_of_token(token)
         if role is None:
-            raise TurnedAway(401, "a wrong token")
+            raise AccessDenied(401, "a wrong token")
 
         self._known(request)
         response = web.Response(text=WELCOME, content_type="text/html")
@@ -185,12 +185,12 @@ class Web:
 
     async def _metrics(self, _request: web.Request) -> web.Response:
         """Give out the figures of the arms; needs the extra `metrics`."""
-        text = await panel_metrics(self._desk)
+        text = await panel_metrics(self._state)
         return web.Response(body=text, headers={"Content-Type": CONTENT_TYPE})
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         """Serve a page until it goes, or does not answer any more."""
-        session = self._desk.join(self._role(request), request.remote or "?")
+        session = self._state.join(self._role(request), request.remote or "?")
         socket = web.WebSocketResponse(heartbeat=PINGS, max_msg_size=LARGEST_MESSAGE, compress=False, timeout=1.0)
         socket.headers.update(HEADERS)
         pumping: asyncio.Task[None] | None = None
@@ -207,7 +207,7 @@ class Web:
 
         return socket
 
-    async def _left(self, session: Session, pumping: asyncio.Task[None] | None) -> None:
+    async def _left(self, session: PageSession, pumping: asyncio.Task[None] | None) -> None:
         """End all that a page has going on."""
         await session.aclose()
         if pumping:
@@ -216,18 +216,18 @@ class Web:
     async def _upload(self, request: web.Request) -> web.Response:
         """Take a file to be drawn."""
         self._check_operator(request)
-        self._desk.station(request.query.get("arm"))
+        self._state.station(request.query.get("arm"))
         name, mode = printable(request.query.get("name", ""), 100), request.query.get("mode", "outline")
         if mode not in MODES:
             raise ValueError(f"mode must be one of {', '.join(MODES)}")
 
         data = await self._body(request, LARGEST_FILE)
-        return as_json(await self._desk.drawings.add(data, name, mode))
+        return as_json(await self._state.drawings.add(data, name, mode))
 
     async def _load(self, request: web.Request) -> web.Response:
         """Take a recording, which the page loads by `teach_load`."""
         self._check_operator(request)
-        station = self._desk.station(request.match_info["name"])
+        station = self._state.station(request.match_info["name"])
         data = await self._body(request, LARGEST_RECORDING)
         return as_json(await station.taught.add(data, printable(request.query.get("name", ""), 100)))
 
@@ -237,7 +237,7 @@ class Web:
         if suffix not in {"json", "playback"}:
             raise web.HTTPNotFound
 
-        station = self._desk.station(name)
+        station = self._state.station(name)
         text = station.taught.text(suffix)
         headers = {"Content-Disposition": f'attachment; filename="{safe(name)}.{suffix}"'}
         return web.Response(body=text.encode(), content_type="application/octet-stream", headers=headers)
@@ -246,7 +246,7 @@ class Web:
         """Return what was uploaded; not too much of it, not too often, and not too slowly."""
         self._uploads.spend(1)
         if self._uploads.wait:
-            raise Refusal("rate", "too many files: wait for a few seconds")
+            raise PanelRefusal("rate", "too many files: wait for a few seconds")
 
         if (request.content_length or 0) > largest:
             raise Oversize(largest)
@@ -259,7 +259,7 @@ class Web:
                     if len(data) > largest:
                         raise Oversize(largest)
         except TimeoutError:
-            raise Refusal("timeout", "the file comes too slowly") from None
+            raise PanelRefusal("timeout", "the file comes too slowly") from None
 
         return bytes(data)
 
@@ -275,14 +275,14 @@ class Web:
         logger.info("%s: turned away: %s%s", printable(who), printable(why), more)
 
 
-class Oversize(TurnedAway):
+class Oversize(AccessDenied):
     """Too many bytes."""
 
     def __init__(self, largest: int) -> None:
         super().__init__(413, f"a file has {largest // 1024} kB at most")
 
 
-async def pump(session: Session, socket: web.WebSocketResponse) -> None:
+async def pump(session: PageSession, socket: web.WebSocketResponse) -> None:
     """Send what waits for a page; end its connection when nothing more will come."""
     try:
         while (text := await session.outlet.get()) is not None:

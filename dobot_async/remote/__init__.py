@@ -8,8 +8,8 @@ What MCP and MQTT have in common: which arms there are, what may be done with th
 from dobot_async.remote.actions import Action, parse_action
 from dobot_async.remote.drawing import Draw
 from dobot_async.remote.moves import Grip, Home, Move, Pick, Place, Recover
+from dobot_async.remote.reports import reach_told, scene_told, state_told
 from dobot_async.remote.site import RemoteArm, Site, open_site
-from dobot_async.remote.told import reach_told, scene_told, state_told
 from dobot_async.remote.works import Busy, Works
 
 __all__ = [

@@ -64,9 +64,9 @@ class Draw(Strict):
             note(f"drawing: {told.strokes} of {told.of} strokes")
 
         note("drawing")
-        await on.manners.pace(on.arm, percent)
+        await on.traits.pace(on.arm, percent)
         arm: Any = on.arm
-        drawing = Drawing(arm, path, self.plane(), tool="pen", progress=progress, **on.manners.pen(percent))
+        drawing = Drawing(arm, path, self.plane(), tool="pen", progress=progress, **on.traits.pen(percent))
         await drawing.run()
         return {"strokes": len(path), "mm": round(path.length, 1), **await reached(on, self.do)}
 
@@ -74,7 +74,7 @@ class Draw(Strict):
         """Return about how long it takes; None where nothing tells."""
         percent = on.check_speed(self.speed)
         try:
-            return estimate(self.toolpath(), self.plane(), arm=on.arm, tool="pen", **on.manners.pen(percent)).seconds
+            return estimate(self.toolpath(), self.plane(), arm=on.arm, tool="pen", **on.traits.pen(percent)).seconds
         except ValueError:
             return None
 

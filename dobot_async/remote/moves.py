@@ -8,8 +8,8 @@ from typing import Any, Literal, cast
 from dobot_async.handling import pick, place
 from dobot_async.handling.arms import move_straight, settle_time
 from dobot_async.remote.actions import Note, Strict, Way, action
+from dobot_async.remote.reports import pose_told
 from dobot_async.remote.site import RemoteArm
-from dobot_async.remote.told import pose_told
 
 __all__ = ["Grip", "Home", "Move", "Pick", "Place", "Recover"]
 
@@ -41,7 +41,7 @@ class Home(Unseen):
     async def run(self, on: RemoteArm, note: Note) -> dict[str, Any]:
         """Do it."""
         note("driving home")
-        await on.arm.home(**on.manners.home(on.fastest))
+        await on.arm.home(**on.traits.home(on.fastest))
         return await reached(on, self.do)
 
 
@@ -65,8 +65,8 @@ class Move(Strict):
         if not given and self.r is None:
             raise ValueError("move needs x, y, z or r")
 
-        if self.r is not None and not on.manners.turns:
-            raise ValueError(f"r: the hand of a {on.manners.title} is not turned so")
+        if self.r is not None and not on.traits.turns:
+            raise ValueError(f"r: the hand of a {on.traits.title} is not turned so")
 
         if self.x is not None and self.y is not None and self.z is not None:
             on.check_spot((self.x, self.y, self.z))
@@ -88,8 +88,8 @@ class Move(Strict):
         start = pose.x, pose.y, pose.z
         end = self.target(start)
         on.check_spot(end)
-        await on.manners.pace(on.arm, percent)
-        options, arm = dict(on.manners.moves(percent)), cast(Any, on.arm)
+        await on.traits.pace(on.arm, percent)
+        options, arm = dict(on.traits.moves(percent)), cast(Any, on.arm)
         if self.straight:
             await move_straight(arm, self.whole(on, end, pose), **options)
         else:
@@ -106,14 +106,14 @@ class Move(Strict):
 
     def whole(self, on: RemoteArm, end: Spot, pose: Any) -> Any:
         """The target of a straight way: of an arm that turns its tool, with its rotation."""
-        if not on.manners.turns:
+        if not on.traits.turns:
             return end
 
         return type(pose)(*end, pose.r if self.r is None else self.r, *pose.joints)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Handling(Strict):
+class PickOrPlace(Strict):
     """What picking and placing have in common."""
 
     x: float
@@ -126,8 +126,8 @@ class Handling(Strict):
     def check(self, on: RemoteArm) -> None:
         """The place, what is above it, and the tool."""
         on.check_speed(self.speed)
-        if self.tool not in on.manners.tools:
-            raise ValueError(f"tool: a {on.manners.title} has {' and '.join(on.manners.tools)}, not {self.tool}")
+        if self.tool not in on.traits.tools:
+            raise ValueError(f"tool: a {on.traits.title} has {' and '.join(on.traits.tools)}, not {self.tool}")
 
         if not 0 < self.approach <= HIGHEST:
             raise ValueError(f"approach must be above 0 and at most {HIGHEST:g} mm, not {self.approach!r}")
@@ -154,7 +154,7 @@ class Handling(Strict):
 
 @action
 @dataclass(frozen=True, kw_only=True)
-class Pick(Handling):
+class Pick(PickOrPlace):
     """Pick a part up."""
 
     do: Literal["pick"] = "pick"
@@ -163,14 +163,14 @@ class Pick(Handling):
         """Do it."""
         note("picking")
         percent = on.check_speed(self.speed)
-        await on.manners.pace(on.arm, percent)
-        await pick(on.arm, self.spot, tool=self.tool, approach=self.approach, **on.manners.moves(percent))
+        await on.traits.pace(on.arm, percent)
+        await pick(on.arm, self.spot, tool=self.tool, approach=self.approach, **on.traits.moves(percent))
         return await reached(on, self.do)
 
 
 @action
 @dataclass(frozen=True, kw_only=True)
-class Place(Handling):
+class Place(PickOrPlace):
     """Put down what the tool holds."""
 
     do: Literal["place"] = "place"
@@ -179,8 +179,8 @@ class Place(Handling):
         """Do it."""
         note("placing")
         percent = on.check_speed(self.speed)
-        await on.manners.pace(on.arm, percent)
-        await place(on.arm, self.spot, tool=self.tool, approach=self.approach, **on.manners.moves(percent))
+        await on.traits.pace(on.arm, percent)
+        await place(on.arm, self.spot, tool=self.tool, approach=self.approach, **on.traits.moves(percent))
         return await reached(on, self.do)
 
 
@@ -195,8 +195,8 @@ class Grip(Unseen):
 
     def check(self, on: RemoteArm) -> None:
         """Whether the arm has the tool."""
-        if self.tool not in on.manners.tools:
-            raise ValueError(f"tool: a {on.manners.title} has {' and '.join(on.manners.tools)}, not {self.tool}")
+        if self.tool not in on.traits.tools:
+            raise ValueError(f"tool: a {on.traits.title} has {' and '.join(on.traits.tools)}, not {self.tool}")
 
     async def run(self, on: RemoteArm, note: Note) -> dict[str, Any]:
         """Do it."""

@@ -15,7 +15,7 @@ from dobot_async.fleet.cell import Cell
 from dobot_async.fleet.fleet import Fleet
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.member import Member
-from dobot_async.remote.manners import Manners, manners_of
+from dobot_async.remote.family_traits import FamilyTraits, traits_of
 from dobot_async.toolpath import reach_of
 
 __all__ = ["SPEED", "RemoteArm", "Site", "open_site"]
@@ -33,7 +33,7 @@ class RemoteArm:
     Attributes:
         name: What it is called.
         arm: The arm.
-        manners: Its family's.
+        traits: Its family's.
         fastest: Percent of its speed, at the most.
         workspace: Where its tool may be; None is wherever it reaches.
         base: Where it stands in its cell, None for one that stands in none.
@@ -42,7 +42,7 @@ class RemoteArm:
 
     name: str
     arm: Arm
-    manners: Manners
+    traits: FamilyTraits
     fastest: float
     workspace: Workspace | None
     base: BaseFrame | None
@@ -149,13 +149,13 @@ async def open_site(
         options["workspace"] = workspace
 
     limited = {
-        each: replace(member, options={**manners_of(member.kind).options, **member.options, **options})
+        each: replace(member, options={**traits_of(member.kind).options, **member.options, **options})
         for each, member in members.items()
     }
 
     def known(each: str, arm: Arm, recover: Callable[[], Awaitable[None]]) -> RemoteArm:
         base = members[each].base if isinstance(where, Cell) else None
-        return RemoteArm(each, arm, manners_of(type(arm)), float(speed), workspace, base, recover)
+        return RemoteArm(each, arm, traits_of(type(arm)), float(speed), workspace, base, recover)
 
     if not isinstance(where, Cell):
         async with limited[name].kind.connect(where.url, **limited[name].options) as arm:

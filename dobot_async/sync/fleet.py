@@ -20,12 +20,12 @@ from dobot_async._core.util.shapes import Shape
 from dobot_async.fleet import BaseFrame, Place, Start
 from dobot_async.fleet import Member as AsyncMember
 from dobot_async.fleet import Together as AsyncTogether
-from dobot_async.fleet.crew import OnFailure
+from dobot_async.fleet.fleet_base import OnFailure
 from dobot_async.sync.calls import in_thread
 from dobot_async.sync.magician import Batch, Magician
 from dobot_async.sync.mycobot import CobotBatch, MyCobot
 from dobot_async.sync.portal import PORTAL
-from dobot_async.sync.twin import Block, Twin
+from dobot_async.sync.twin import BlockingContext, Twin
 from dobot_async.sync.twins import asynchronous_of, blocking_of, twin_of
 from dobot_async.sync.ultraarm import UltraArm, UltraArmBatch
 
@@ -136,7 +136,7 @@ class Fleet(Twin[AsyncFleet[Any]], Generic[A]):
         """
         members = {name: arm.asynchronous() if isinstance(arm, Member) else arm for name, arm in arms.items()}
         connect = partial(AsyncFleet.connect, cast("Any", members), zones=zones, groups=groups, **options)
-        return Block(connect, Fleet[Any], f"the fleet of {', '.join(arms)}")
+        return BlockingContext(connect, Fleet[Any], f"the fleet of {', '.join(arms)}")
 
     @classmethod
     def from_file(cls, path: str | Path, **options: Any) -> AbstractContextManager[Fleet[AnyArm]]:
@@ -151,7 +151,7 @@ class Fleet(Twin[AsyncFleet[Any]], Generic[A]):
             OSError: It cannot be read.
             ConnectFailed: An arm did not answer.
         """
-        return Block(lambda: AsyncFleet.from_file(path, **options), Fleet[AnyArm], f"the fleet of {path}")
+        return BlockingContext(lambda: AsyncFleet.from_file(path, **options), Fleet[AnyArm], f"the fleet of {path}")
 
     @property
     def failures(self) -> dict[str, DobotError]:
@@ -300,7 +300,9 @@ class Fleet(Twin[AsyncFleet[Any]], Generic[A]):
             ReplyTimeout: It was not free in time.
             MotionStopped: The fleet was stopped while this waited.
         """
-        return Block(lambda: self.asynchronous.zone(name, *arms, timeout=timeout), twin_of, f"the zone {name}")
+        return BlockingContext(
+            lambda: self.asynchronous.zone(name, *arms, timeout=timeout), twin_of, f"the zone {name}"
+        )
 
     def holders(self, zone: str) -> list[str]:
         """Returns the names of those who hold a zone."""
@@ -339,4 +341,4 @@ class Fleet(Twin[AsyncFleet[Any]], Generic[A]):
             ZoneDeadlock: The ways of two of the arms lead through one zone.
             DobotError: The batches could not be loaded or released; the arms were stopped.
         """
-        return Block(lambda: self.asynchronous.together(*names, timeout=timeout), Together[Any], "together")
+        return BlockingContext(lambda: self.asynchronous.together(*names, timeout=timeout), Together[Any], "together")

@@ -29,7 +29,7 @@ from dobot_async.sync.follow import Follow
 from dobot_async.sync.link import Link
 from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
-from dobot_async.sync.twin import Block, Items, Twin, same
+from dobot_async.sync.twin import BlockingContext, Items, Twin, same
 from dobot_async.traces.recorder import Record
 
 __all__ = ["Batch", "Download", "Magician", "MagicianQueue", "WiFi"]
@@ -85,7 +85,7 @@ class MagicianQueue(QueueTwin[AsyncMagicianQueue], Verbs[Motion]):
             ValueError: A rail or a pin that a command needs was not declared; none was sent.
             DobotError: As `put`; what was accepted before that is pending.
         """
-        return Block(lambda: self.asynchronous.batch(timeout=timeout), Batch, "batch")
+        return BlockingContext(lambda: self.asynchronous.batch(timeout=timeout), Batch, "batch")
 
     def download(self, *, loops: int = 1) -> AbstractContextManager[Download]:
         """Store the commands of the block in the arm, which runs them when its key is pressed. Manual 2.19.4.
@@ -100,7 +100,7 @@ class MagicianQueue(QueueTwin[AsyncMagicianQueue], Verbs[Motion]):
             ValueError: A rail or a pin that a command needs was declared neither to the arm nor in the program.
             MotionStopped: The arm was stopped meanwhile; a part of the program may be stored.
         """
-        return Block(lambda: self.asynchronous.download(loops=loops), Download, "download")
+        return BlockingContext(lambda: self.asynchronous.download(loops=loops), Download, "download")
 
     def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
         """Give one command to the arm's queue and return once the arm has accepted it.
@@ -281,7 +281,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
             ValueError: The URL or an argument is wrong.
             ConnectFailed: No arm answered; the message says what to check.
         """
-        return Block(
+        return BlockingContext(
             lambda: AsyncMagician.connect(
                 url,
                 control=control,
@@ -512,7 +512,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
             CommandRejected: The arm executes what is queued, and would not hear the jog.
             MotionStopped: It was stopped before the tool left the workspace of `connect`; raised when the block ends.
         """
-        return Block(lambda: self.asynchronous.jogging(direction), same, "jogging")
+        return BlockingContext(lambda: self.asynchronous.jogging(direction), same, "jogging")
 
     def taught_points(self, mode: c.HHTTrigMode = c.HHTTrigMode.TRIGGERED_ON_KEY_RELEASED) -> Items[c.Pose]:
         """Yields the poses of hand-guided teaching (HHT): the user presses the key on the forearm, and guides the arm.
@@ -552,7 +552,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
             MotionUnknown: The arm is silent, the link was lost, or the arm was switched off and on.
             ConnectionLost: The link is gone.
         """
-        return Block(
+        return BlockingContext(
             lambda: self.asynchronous.following(
                 rate=rate, max_speed=max_speed, max_turn=max_turn, stale=stale, way=way
             ),

@@ -28,7 +28,7 @@ from dobot_async.sync.follow import Follow
 from dobot_async.sync.link import Link
 from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
-from dobot_async.sync.twin import Block, same
+from dobot_async.sync.twin import BlockingContext, same
 from dobot_async.traces.recorder import Record
 
 __all__ = ["CobotBatch", "CobotQueue", "MyCobot"]
@@ -67,7 +67,7 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
         Raises:
             DobotError: As `put`; what was accepted before that is pending.
         """
-        return Block(lambda: self.asynchronous.batch(timeout=timeout), CobotBatch, "batch")
+        return BlockingContext(lambda: self.asynchronous.batch(timeout=timeout), CobotBatch, "batch")
 
     @property
     def unsent(self) -> int:
@@ -212,7 +212,7 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
             MotionStopped: The block has ended without an error, and motions were still waiting in the queue on this
                 side: they were never sent.
         """
-        return Block(
+        return BlockingContext(
             lambda: AsyncMyCobot.connect(
                 url,
                 model=model,
@@ -455,7 +455,7 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
             ArmAlarm: A joint keeps it from moving.
             ReplyTimeout: The arm does not answer when it is to begin, or when it is to stop.
         """
-        return Block(lambda: self.asynchronous.jogging(direction, speed=speed), same, "jogging")
+        return BlockingContext(lambda: self.asynchronous.jogging(direction, speed=speed), same, "jogging")
 
     def following(
         self,
@@ -486,7 +486,7 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
             MotionUnknown: The arm is silent, or the link was lost.
             ConnectionLost: The link is gone.
         """
-        return Block(
+        return BlockingContext(
             lambda: self.asynchronous.following(
                 rate=rate, max_speed=max_speed, max_turn=max_turn, stale=stale, speed=speed
             ),

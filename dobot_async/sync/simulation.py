@@ -16,7 +16,7 @@ from dobot_async.simulator import simulate as simulate_asynchronously
 from dobot_async.simulator.endpoints import MyCobotModel
 from dobot_async.simulator.scene import Mount, Scene
 from dobot_async.sync.portal import PORTAL
-from dobot_async.sync.twin import Block, Twin
+from dobot_async.sync.twin import BlockingContext, Twin
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -233,4 +233,4 @@ def simulate(
     """
     given: dict[str, Any] = {"listen": listen, "speed": speed, "seed": seed, "faults": faults, "clock": clock}
     given |= {"scene": scene, "mount": mount, **details}
-    return Block(lambda: simulate_asynchronously(model, **given), Simulation[Any], f"simulate({model!r})")
+    return BlockingContext(lambda: simulate_asynchronously(model, **given), Simulation[Any], f"simulate({model!r})")

@@ -10,7 +10,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from dobot_async.sync.portal import PORTAL
 
-__all__ = ["Block", "Items", "Twin", "same"]
+__all__ = ["BlockingContext", "Items", "Twin", "same"]
 
 A = TypeVar("A")
 T = TypeVar("T")
@@ -43,7 +43,7 @@ class Twin(Generic[A]):
         return f"<{type(self).__name__} of {self.asynchronous!r}>"
 
 
-class Block(AbstractContextManager[T], Generic[A, T]):
+class BlockingContext(AbstractContextManager[T], Generic[A, T]):
     """An asynchronous block, to be used with `with`.
 
     Args:

@@ -27,7 +27,7 @@ from dobot_async.sync.link import Link
 from dobot_async.sync.motion import Motion
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.streams import GCodeRun
-from dobot_async.sync.twin import Block, same
+from dobot_async.sync.twin import BlockingContext, same
 from dobot_async.traces.recorder import Record
 
 __all__ = ["UltraArm", "UltraArmBatch", "UltraArmQueue"]
@@ -64,7 +64,7 @@ class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
         Raises:
             DobotError: As `put`; what was accepted before that is pending.
         """
-        return Block(lambda: self.asynchronous.batch(timeout=timeout), UltraArmBatch, "batch")
+        return BlockingContext(lambda: self.asynchronous.batch(timeout=timeout), UltraArmBatch, "batch")
 
     @property
     def unsent(self) -> int:
@@ -212,7 +212,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
             ValueError: The URL or an argument is wrong.
             ConnectFailed: No arm answered; the message says what to check.
         """
-        return Block(
+        return BlockingContext(
             lambda: AsyncUltraArm.connect(
                 url,
                 control=control,
@@ -395,7 +395,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
             MotionStopped: It was stopped before the tool left the workspace of `connect`.
             ReplyTimeout: The arm does not acknowledge that it is to begin, or is not seen to stand.
         """
-        return Block(lambda: self.asynchronous.jogging(direction, speed=speed), same, "jogging")
+        return BlockingContext(lambda: self.asynchronous.jogging(direction, speed=speed), same, "jogging")
 
     def jog_stop(self, *, timeout: float = 5.0) -> None:
         """End a jog; what is in the arm's queue goes on. Manual 5, M15.
@@ -435,7 +435,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
             MotionUnknown: The arm is silent, or the link was lost.
             ConnectionLost: The link is gone.
         """
-        return Block(
+        return BlockingContext(
             lambda: self.asynchronous.following(
                 rate=rate, max_speed=max_speed, max_turn=max_turn, stale=stale, constant_speed=constant_speed
             ),

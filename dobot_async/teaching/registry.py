@@ -8,9 +8,9 @@ from typing import Any
 from dobot_async.arms.magician.arm import Magician
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.ultraarm.arm import UltraArm
-from dobot_async.teaching.arms.magician import MagicianLimits, TaughtMagician
-from dobot_async.teaching.arms.mycobot import CobotLimits, TaughtCobot
-from dobot_async.teaching.arms.ultraarm import TaughtUltraArm, UltraArmLimits
+from dobot_async.teaching.arms.magician import MagicianRecordingLimits, TaughtMagician
+from dobot_async.teaching.arms.mycobot import CobotRecordingLimits, TaughtCobot
+from dobot_async.teaching.arms.ultraarm import TaughtUltraArm, UltraArmRecordingLimits
 from dobot_async.teaching.base import RecordingLimits, TaughtArm
 from dobot_async.teaching.problems import RecordingUnfit
 from dobot_async.teaching.recording import Recording
@@ -23,9 +23,9 @@ ARMS: Mapping[type, Callable[[Any], TaughtArm]] = {
     UltraArm: TaughtUltraArm,
 }
 LIMITS: Mapping[str, Callable[[Recording], RecordingLimits]] = {
-    "magician": MagicianLimits.of,
-    "mycobot": CobotLimits.of,
-    "ultraarm": UltraArmLimits.of,
+    "magician": MagicianRecordingLimits.of,
+    "mycobot": CobotRecordingLimits.of,
+    "ultraarm": UltraArmRecordingLimits.of,
 }
 
 

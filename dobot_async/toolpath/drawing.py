@@ -25,7 +25,7 @@ from dobot_async.arms.magician.arm import Magician
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, another
-from dobot_async.toolpath.moves import Move, Tool, approach, check_moves, from_point
+from dobot_async.toolpath.moves import Tool, ToolpathMove, approach, check_moves, from_point
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.position import Sent, StrokePosition, along, stand_of
 from dobot_async.toolpath.programs import DrawingPace, Instruction, check_tool, program_for
@@ -164,7 +164,7 @@ class Drawing:
         """Return the arguments with which the rest is drawn, for the note on an error."""
         return f"first={self.next_stroke}" + (f", point={self.next_point}" if self.next_point else "")
 
-    def _moves(self, here: Place) -> list[Move]:
+    def _moves(self, here: Place) -> list[ToolpathMove]:
         """All moves that are still to be made."""
         strokes = self._strokes[self.next_stroke :]
         moves = from_point(strokes[0], self.next_point) + [move for some in strokes[1:] for move in some]

@@ -17,7 +17,18 @@ from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.stroke import Stroke
 from dobot_async.toolpath.toolpath import Toolpath
 
-__all__ = ["SAME", "Move", "MoveKind", "Reach", "Tool", "approach", "check_moves", "fastest", "from_point", "moves_of"]
+__all__ = [
+    "SAME",
+    "MoveKind",
+    "Reach",
+    "Tool",
+    "ToolpathMove",
+    "approach",
+    "check_moves",
+    "fastest",
+    "from_point",
+    "moves_of",
+]
 
 Tool = Literal["pen", "laser"]
 Reach = Callable[[Place], None]
@@ -39,7 +50,7 @@ class MoveKind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class ToolpathMove:
     """One straight way.
 
     Attributes:
@@ -59,7 +70,7 @@ class Move:
     point: int = 0
 
 
-def moves_of(toolpath: Toolpath, plane: WorkPlane, tool: Tool, speeds: Sequence[float]) -> list[list[Move]]:
+def moves_of(toolpath: Toolpath, plane: WorkPlane, tool: Tool, speeds: Sequence[float]) -> list[list[ToolpathMove]]:
     """Return the moves of each stroke, from above its start (the laser: at it) to above its end."""
     make = pen_moves if tool == "pen" else laser_moves
     return [
@@ -68,34 +79,34 @@ def moves_of(toolpath: Toolpath, plane: WorkPlane, tool: Tool, speeds: Sequence[
     ]
 
 
-def pen_moves(stroke: Stroke, number: int, plane: WorkPlane, speed: float) -> Iterator[Move]:
+def pen_moves(stroke: Stroke, number: int, plane: WorkPlane, speed: float) -> Iterator[ToolpathMove]:
     """Over the start, down, along, and up."""
     powers = stroke.powers
-    yield Move(MoveKind.TRAVEL, plane.to_arm(*stroke.start, plane.lift), 0.0, speed, number)
-    yield Move(MoveKind.LOWER, plane.pressed(stroke.start, powers[0]), 0.0, speed, number)
+    yield ToolpathMove(MoveKind.TRAVEL, plane.to_arm(*stroke.start, plane.lift), 0.0, speed, number)
+    yield ToolpathMove(MoveKind.LOWER, plane.pressed(stroke.start, powers[0]), 0.0, speed, number)
     for point, (place, power) in enumerate(zip(stroke.points[1:], powers[1:], strict=True), 1):
-        yield Move(MoveKind.DRAW, plane.pressed(place, power), power, speed, number, point)
+        yield ToolpathMove(MoveKind.DRAW, plane.pressed(place, power), power, speed, number, point)
 
-    yield Move(MoveKind.LIFT, plane.to_arm(*stroke.end, plane.lift), 0.0, speed, number, len(powers) - 1)
+    yield ToolpathMove(MoveKind.LIFT, plane.to_arm(*stroke.end, plane.lift), 0.0, speed, number, len(powers) - 1)
 
 
-def laser_moves(stroke: Stroke, number: int, plane: WorkPlane, speed: float) -> Iterator[Move]:
+def laser_moves(stroke: Stroke, number: int, plane: WorkPlane, speed: float) -> Iterator[ToolpathMove]:
     """To the start without power, and along."""
     points, powers = stroke.points, stroke.powers
     if len(points) == 1:
         points, powers = (points[0], (points[0][0] + DOT, points[0][1])), powers * 2
 
-    yield Move(MoveKind.JUMP, plane.to_arm(*points[0]), 0.0, speed, number)
+    yield ToolpathMove(MoveKind.JUMP, plane.to_arm(*points[0]), 0.0, speed, number)
     for point, (place, power) in enumerate(zip(points[1:], powers[1:], strict=True), 1):
-        yield Move(MoveKind.DRAW, plane.to_arm(*place), power, speed, number, point)
+        yield ToolpathMove(MoveKind.DRAW, plane.to_arm(*place), power, speed, number, point)
 
 
-def approach(here: Place, moves: Sequence[Move], plane: WorkPlane) -> list[Move]:
+def approach(here: Place, moves: Sequence[ToolpathMove], plane: WorkPlane) -> list[ToolpathMove]:
     """Return the moves from where the arm is to the first of a drawing: up, across, and for a laser down."""
     first = moves[0]
     at = plane.to_plane(*here)
     above = plane.to_plane(*first.place)
-    found: list[Move] = []
+    found: list[ToolpathMove] = []
     if at.height < plane.lift - SAME:
         found.append(replace(first, kind=MoveKind.TRAVEL, place=plane.to_arm(at.x, at.y, plane.lift)))
 
@@ -106,7 +117,7 @@ def approach(here: Place, moves: Sequence[Move], plane: WorkPlane) -> list[Move]
     return found
 
 
-def from_point(moves: Sequence[Move], point: float) -> list[Move]:
+def from_point(moves: Sequence[ToolpathMove], point: float) -> list[ToolpathMove]:
     """Return the moves of a laser's stroke from a place in it on, which is told in points."""
     behind = int(point)
     start, end = moves[behind].place, moves[behind + 1].place
@@ -115,7 +126,7 @@ def from_point(moves: Sequence[Move], point: float) -> list[Move]:
     return [replace(moves[0], place=place), *moves[behind + 1 :]] if point else list(moves)  # type: ignore[arg-type]
 
 
-def check_moves(moves: Iterable[Move], reach: Reach, here: Place | None = None) -> None:
+def check_moves(moves: Iterable[ToolpathMove], reach: Reach, here: Place | None = None) -> None:
     """Look at the reach every few mm of all moves; `here` is where the first one begins.
 
     Raises:
@@ -152,7 +163,7 @@ def places(here: Place | None, there: Place) -> Iterator[Place]:
     yield there
 
 
-def fastest(moves: Sequence[Move], rate: float, depth: int) -> float:
+def fastest(moves: Sequence[ToolpathMove], rate: float, depth: int) -> float:
     """Return the speed in mm/s at which an arm uses up no more than `rate` moves per second of an unbroken series.
 
     A queue of `depth` moves evens out what is shorter than that.

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from dobot_async._core.queue.motion import Motion
 from dobot_async.arms.magician import commands as m
 from dobot_async.arms.magician.arm import Magician
-from dobot_async.toolpath.moves import SAME, Move, MoveKind
+from dobot_async.toolpath.moves import SAME, MoveKind, ToolpathMove
 from dobot_async.toolpath.plane import Place
 
 __all__ = ["DrawingStand", "Sent", "StrokePosition", "along", "stand_of"]
@@ -52,7 +52,7 @@ class Sent(NamedTuple):
     """
 
     motion: Motion
-    move: Move | None
+    move: ToolpathMove | None
     start: Place
     ends: bool
 

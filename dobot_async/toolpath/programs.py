@@ -25,7 +25,7 @@ from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.ultraarm import commands as u
 from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import UnsupportedError
-from dobot_async.toolpath.moves import Move, MoveKind, Tool
+from dobot_async.toolpath.moves import MoveKind, Tool, ToolpathMove
 from dobot_async.toolpath.plane import Place
 
 __all__ = ["DrawingPace", "DrawingProgram", "Instruction", "program_for"]
@@ -39,7 +39,7 @@ class Instruction(NamedTuple):
 
     row: Command[Any, Any]
     value: Any
-    move: Move | None
+    move: ToolpathMove | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class DrawingPace:
 class DrawingProgram(Protocol):
     """A family's way to say moves."""
 
-    def instructions(self, moves: Iterable[Move]) -> Iterator[Instruction]:
+    def instructions(self, moves: Iterable[ToolpathMove]) -> Iterator[Instruction]:
         """Yield the commands of a whole drawing, in order."""
         ...
 
@@ -79,7 +79,7 @@ class MagicianProgram:
         self._laser = tool == "laser"
         self._acceleration = pace.acceleration
 
-    def instructions(self, moves: Iterable[Move]) -> Iterator[Instruction]:
+    def instructions(self, moves: Iterable[ToolpathMove]) -> Iterator[Instruction]:
         """Yield the commands of a drawing."""
         speed = None
         for move in moves:
@@ -92,7 +92,7 @@ class MagicianProgram:
         if self._laser:
             yield Instruction(m.SET_END_EFFECTOR_LASER, m.EndEffectorLaser(False, False), None)
 
-    def _instruction(self, move: Move) -> Instruction:
+    def _instruction(self, move: ToolpathMove) -> Instruction:
         if self._laser and move.kind in {MoveKind.DRAW, MoveKind.JUMP}:
             return Instruction(m.SET_CPLE_CMD, m.CPLECmd(m.CPMode.ABSOLUTE, *move.place, move.power), move)
 
@@ -115,7 +115,7 @@ class UltraArmProgram:
     def __init__(self, tool: Tool) -> None:
         self._laser = tool == "laser"
 
-    def instructions(self, moves: Iterable[Move]) -> Iterator[Instruction]:
+    def instructions(self, moves: Iterable[ToolpathMove]) -> Iterator[Instruction]:
         """Yield the commands of a drawing."""
         duty = 0
         if self._laser:
@@ -144,7 +144,7 @@ class CobotProgram:
         self._rotation = rotation
         self._percent = pace.percent
 
-    def instructions(self, moves: Iterable[Move]) -> Iterator[Instruction]:
+    def instructions(self, moves: Iterable[ToolpathMove]) -> Iterator[Instruction]:
         """Yield the commands of a drawing."""
         for move in moves:
             coords = tuple(round(number, 1) for number in move.place) + self._rotation

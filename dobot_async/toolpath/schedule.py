@@ -8,7 +8,7 @@ from itertools import islice, pairwise
 from typing import Any, SupportsFloat
 
 from dobot_async._core.util.arguments import check_duration, to_float
-from dobot_async.toolpath.moves import Move, MoveKind, Tool, fastest, moves_of
+from dobot_async.toolpath.moves import MoveKind, Tool, ToolpathMove, fastest, moves_of
 from dobot_async.toolpath.plane import WorkPlane
 from dobot_async.toolpath.position import StrokePosition
 from dobot_async.toolpath.programs import Instruction
@@ -44,7 +44,7 @@ def simplified(toolpath: Toolpath, tolerance: SupportsFloat) -> Toolpath:
 
 def planned(
     path: Toolpath, plane: WorkPlane, tool: Tool, speed: SupportsFloat | None, rate: SupportsFloat | None
-) -> list[list[Move]]:
+) -> list[list[ToolpathMove]]:
     """The moves of each stroke, at speeds at which the line keeps up."""
     given = None if speed is None else above_zero(speed, "speed")
     speeds = [given or stroke.speed or SPEEDS[tool] for stroke in path]
@@ -72,7 +72,7 @@ def batches(instructions: Sequence[Instruction]) -> Iterator[list[tuple[Instruct
         yield some
 
 
-def guess(moves: Sequence[Move]) -> float:
+def guess(moves: Sequence[ToolpathMove]) -> float:
     """About how many seconds a stroke takes."""
     ways = pairwise(moves)
     along = sum(math.dist(a.place, b.place) / b.speed for a, b in ways)
@@ -96,7 +96,9 @@ def whole_percent(value: Any) -> int:
     return int(value)
 
 
-def position_in(strokes: Sequence[Sequence[Move]], stroke: Any, point: SupportsFloat, tool: Tool) -> StrokePosition:
+def position_in(
+    strokes: Sequence[Sequence[ToolpathMove]], stroke: Any, point: SupportsFloat, tool: Tool
+) -> StrokePosition:
     """The place where to begin, checked."""
     if not hasattr(stroke, "__index__"):
         raise TypeError(f"first must be the number of a stroke, not {stroke!r}")

@@ -14,13 +14,13 @@ from dobot_async._core.link.correlator import Correlator
 from dobot_async.traces.reader import Trace, TraceLine
 from dobot_async.traces.words import masked
 
-__all__ = ["JUNK", "Asked", "Exchanges", "Piece"]
+__all__ = ["JUNK", "Exchanges", "RecordedReply", "RecordedRequest"]
 
 JUNK = b"\0"  # begins a frame of no family
 
 
 @dataclass(slots=True)
-class Piece:
+class RecordedReply:
     """Something that came from the arm.
 
     Attributes:
@@ -39,7 +39,7 @@ class Piece:
 
 
 @dataclass(slots=True)
-class Asked:
+class RecordedRequest:
     """A request that was recorded.
 
     Attributes:
@@ -61,7 +61,7 @@ class Asked:
     write: bool = False
     once: bool = False
     raw: tuple[bytes | None, ...] = ()
-    pieces: list[Piece] = field(default_factory=list[Piece])
+    pieces: list[RecordedReply] = field(default_factory=list[RecordedReply])
     latency: float | None = None
 
     @property
@@ -108,13 +108,13 @@ class Exchanges:
 
     def __init__(self, trace: Trace) -> None:
         first = trace.lines[0]
-        self.opening = Asked(-1, -1, first.t)
-        self.asked: list[Asked] = []
+        self.opening = RecordedRequest(-1, -1, first.t)
+        self.asked: list[RecordedRequest] = []
         self.came: list[float] = []
         self.end = trace.lines[-1].t
         self._now = first.t
         self._last = self.opening
-        self._answered: list[Asked] = []
+        self._answered: list[RecordedRequest] = []
         window = first.number("reorder_window")
         self._correlator: Correlator[Said] = Correlator(lambda: self._now, lambda: window, lambda _: None)
         for number, line in enumerate(trace.lines):
@@ -127,14 +127,14 @@ class Exchanges:
                 add(self._last, number, line)
             elif line.kind == "state" and line.text("state") in {"lost", "reopening"}:
                 outage = reopened_at(trace, number) - line.t
-                self._last.pieces.append(Piece(number, line.t - self._last.t, None, outage=outage))
+                self._last.pieces.append(RecordedReply(number, line.t - self._last.t, None, outage=outage))
 
         self._find_ordered()
 
     def _ask(self, number: int, line: TraceLine) -> None:
         raw, name = tuple(masked(line.text("raw"))), line.text("command") or "?"
         write, once = bool(line.fields.get("write")), bool(line.fields.get("once"))
-        self._last = asked = Asked(number, len(self.asked), line.t, name, write, once, raw)
+        self._last = asked = RecordedRequest(number, len(self.asked), line.t, name, write, once, raw)
         self.asked.append(asked)
         self._correlator.sent(line.text("key"), lambda _: self._answered.append(asked))
 
@@ -163,9 +163,9 @@ def reopened_at(trace: Trace, number: int) -> float:
     return next(later, math.inf)
 
 
-def add(asked: Asked, number: int, line: TraceLine, *, ordered: bool = False) -> None:
+def add(asked: RecordedRequest, number: int, line: TraceLine, *, ordered: bool = False) -> None:
     """Add what came to what was asked."""
-    asked.pieces.append(Piece(number, max(line.t - asked.t, 0.0), said(line), ordered))
+    asked.pieces.append(RecordedReply(number, max(line.t - asked.t, 0.0), said(line), ordered))
 
 
 def said(line: TraceLine) -> bytes:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from dobot_async.traces.exchanges import Exchanges
 from dobot_async.traces.reader import Trace
 
-__all__ = ["CommandFigures", "Figures", "MotionFigures", "depth", "figures", "latencies", "percentile"]
+__all__ = ["CommandFigures", "MotionFigures", "TraceFigures", "depth", "figures", "latencies", "percentile"]
 
 
 @dataclass(slots=True)
@@ -48,7 +48,7 @@ class MotionFigures:
 
 
 @dataclass(frozen=True, slots=True)
-class Figures:
+class TraceFigures:
     """What one connection's trace tells.
 
     Attributes:
@@ -74,13 +74,13 @@ class Figures:
     error: str
 
 
-def figures(trace: Trace) -> Figures:
+def figures(trace: Trace) -> TraceFigures:
     """Return the figures of one connection."""
     recorded = Exchanges(trace)
     ends = [line.text("error") for line in trace.lines if line.kind == "end"]
     junk = sum(line.number("count") for line in trace.lines if line.kind == "junk")
     states = [line.text("state") for line in trace.lines if line.kind == "state"]
-    return Figures(
+    return TraceFigures(
         seconds=recorded.end - trace.lines[0].t,
         frames=(len(recorded.asked), len(recorded.came)),
         commands=by_command(recorded),

@@ -21,7 +21,7 @@ from dobot_async.errors import ConnectionLost
 from dobot_async.traces.file import NamedTrace, TraceFile
 from dobot_async.traces.words import MASK, FrameWords
 
-__all__ = ["Record", "Recorder", "Recording", "recorded", "shared"]
+__all__ = ["Record", "RecordSettings", "TraceRecorder", "recorded", "shared"]
 
 T = TypeVar("T")
 Record = str | os.PathLike[str] | TraceFile | NamedTrace
@@ -29,7 +29,7 @@ Record = str | os.PathLike[str] | TraceFile | NamedTrace
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class RecordSettings:
     """What a connection is to be recorded with.
 
     Attributes:
@@ -45,7 +45,7 @@ class Recording:
     reply_timeout: tuple[float, float]
 
 
-class Queue(Protocol):
+class RecordedQueue(Protocol):
     """The queue of an arm, as far as a trace is concerned."""
 
     @property
@@ -55,7 +55,7 @@ class Queue(Protocol):
 
 
 @contextmanager
-def recorded(recording: Recording | None, url: str) -> Generator[Recorder | None]:
+def recorded(recording: RecordSettings | None, url: str) -> Generator[TraceRecorder | None]:
     """Record a connection for the length of a block; yields None where that is not wanted.
 
     Raises:
@@ -68,7 +68,7 @@ def recorded(recording: Recording | None, url: str) -> Generator[Recorder | None
 
     name = recording.target.name if isinstance(recording.target, NamedTrace) else ""
     with shared(recording.target) as file:
-        recorder = Recorder(file, recording, hidden(url), name)
+        recorder = TraceRecorder(file, recording, hidden(url), name)
         try:
             yield recorder
         except BaseException as error:
@@ -109,7 +109,7 @@ class Heard(Listener[T], Generic[T]):
         self._hear(event)
 
 
-class Recorder:
+class TraceRecorder:
     """Records one connection.
 
     Args:
@@ -119,7 +119,7 @@ class Recorder:
         name: The arm's, "" where there is only one.
     """
 
-    def __init__(self, file: TraceFile, recording: Recording, url: str, name: str) -> None:
+    def __init__(self, file: TraceFile, recording: RecordSettings, url: str, name: str) -> None:
         self._file = file
         self._recording = recording
         self._url = url
@@ -131,7 +131,7 @@ class Recorder:
         self._count = itertools.count(1)
         self._heard = Heard(self._event), Heard(self._state)
 
-    def watch(self, link: Link[Any], queue: Queue) -> None:
+    def watch(self, link: Link[Any], queue: RecordedQueue) -> None:
         """Record a link, from its first frame on, and a queue; call it before anything was sent."""
         self._link = link
         limits = link.limits

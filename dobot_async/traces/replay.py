@@ -20,7 +20,7 @@ import anyio
 
 from dobot_async.arms.registry import Parts, families
 from dobot_async.errors import ConnectFailed
-from dobot_async.traces.exchanges import Asked, Piece
+from dobot_async.traces.exchanges import RecordedReply, RecordedRequest
 from dobot_async.traces.reader import Trace, TraceLine, TraceProblem, read_trace
 from dobot_async.traces.script import Script, Unrecorded
 from dobot_async.transports.options import Option, number, options, words
@@ -153,7 +153,7 @@ class Due:
 
     at: float
     number: int
-    piece: Piece = field(compare=False)
+    piece: RecordedReply = field(compare=False)
     later: float = field(compare=False)  # seconds than in the recording, both counted from the beginning
 
 
@@ -212,7 +212,7 @@ class ReplayTransport:
         if self._timer:
             self._timer.cancel()
 
-    def _plan(self, asked: Asked) -> None:
+    def _plan(self, asked: RecordedRequest) -> None:
         """Have what was said to a request come when its time has come."""
         now = self._loop.time()
         for piece in asked.pieces:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import bisect
 import math
 
-from dobot_async.traces.exchanges import JUNK, Asked, Exchanges
+from dobot_async.traces.exchanges import JUNK, Exchanges, RecordedRequest
 from dobot_async.traces.reader import Trace
 
 __all__ = ["Script", "Unrecorded"]
@@ -42,7 +42,7 @@ class Script:
         recorded = Exchanges(trace)
         self.opening = recorded.opening
         self._asked, self._came, self._end = recorded.asked, recorded.came, recorded.end
-        self._known: dict[bytes, list[Asked]] = {}
+        self._known: dict[bytes, list[RecordedRequest]] = {}
         self._secret = [each for each in self._asked if each.secret]
         for each in self._asked:
             if not each.secret:
@@ -57,7 +57,7 @@ class Script:
         """Begin at a time in seconds."""
         self._behind = self.opening.t - now
 
-    def asked(self, data: bytes, now: float, heard: int) -> Asked:
+    def asked(self, data: bytes, now: float, heard: int) -> RecordedRequest:
         """Return what was recorded of a request.
 
         Args:
@@ -88,19 +88,19 @@ class Script:
         self._behind = found.t - now if write else min(self._behind, found.t - now)
         return found
 
-    def _has_come(self, found: Asked, now: float) -> bool:
+    def _has_come(self, found: RecordedRequest, now: float) -> bool:
         """Whether a question may be asked already: up to `SLACK` earlier, but not before a motion that was recorded."""
         early = found.t - (now + self._behind)
         between = self._asked[self._next : found.place] if early > 0 else ()
         return early <= SLACK and not any(each.once for each in between)
 
-    def _unknown(self, data: bytes, now: float) -> Asked:
+    def _unknown(self, data: bytes, now: float) -> RecordedRequest:
         """Leave what was never asked unanswered, as if it had been lost; the second time the replay ends."""
         if not self._silent(now) and data in self._unanswered:
             raise Unrecorded(f"the trace has no answer to {data.hex(' ')[:60]}: is this the program that was recorded?")
 
         self._unanswered.add(data)
-        return Asked(-1, -1, now)
+        return RecordedRequest(-1, -1, now)
 
     def _silent(self, now: float) -> bool:
         """Whether the arm did not answer, at this time of the recording, although it was asked."""
@@ -110,10 +110,10 @@ class Script:
         unanswered = bisect.bisect_right(self._asked, since, key=lambda each: each.t)
         return unanswered < len(self._asked) and self._asked[unanswered].t < clock - SLACK
 
-    def _again(self, known: list[Asked], data: bytes, now: float, least: int) -> Asked:
+    def _again(self, known: list[RecordedRequest], data: bytes, now: float, least: int) -> RecordedRequest:
         """Return what is said to what is asked more often than it was: as the last time, but by an arm that speaks."""
         if self._silent(now):
-            return Asked(-1, -1, now)
+            return RecordedRequest(-1, -1, now)
 
         if known[0].once:
             return self._unknown(data, now)

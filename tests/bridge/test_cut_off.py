@@ -20,8 +20,8 @@ from dobot_async import Magician
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import encode
 from dobot_async.bridge import Limits
-from dobot_async.bridge.doors import Listeners
 from dobot_async.bridge.handshake import PENDING
+from dobot_async.bridge.listeners import Listeners
 
 GET_POSE = encode(ask(c.GET_POSE))
 

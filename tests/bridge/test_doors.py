@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from dobot_async import ConnectFailed, Magician, open_transport
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import Parser, encode
-from dobot_async.bridge.doors import Listeners
+from dobot_async.bridge.listeners import Listeners
 
 TOKEN = "geheim-4711"
 PLACES = ["tcp://127.0.0.1:0", "udp://127.0.0.1:0", "ws://127.0.0.1:0"]

@@ -19,7 +19,7 @@ from click.testing import CliRunner
 from dobot_async import DeviceInfo, Found
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import Frame
-from dobot_async.arms.magician.traced import FRAMES
+from dobot_async.arms.magician.trace_words import FRAMES
 from dobot_async.cli.commands.discover import table
 from dobot_async.cli.main import cli
 from dobot_async.simulator import Simulation, announced, simulate

@@ -84,7 +84,7 @@ class Run:
 
     async def play(self) -> None:
         """Runs all programs under the eyes of an observer."""
-        work = (self.observe(), self.strike(), waits.watch(self.fleet._zones.claims))
+        work = (self.observe(), self.strike(), waits.watch(self.fleet._zones.locks))
         watching = [asyncio.create_task(each) for each in work]
         try:
             async with asyncio.timeout(LONG):
@@ -107,7 +107,7 @@ class Run:
             if moving:
                 raise Violation(f"{moving} go on although {list(self.fleet.failures)} failed")
 
-        held = [party for party in self.held().get("turn", []) if party]
+        held = [holder for holder in self.held().get("turn", []) if holder]
         if held:
             raise Violation(f"turn is held by {held} though all programs have ended")
 

@@ -363,7 +363,7 @@ async def run(seed: int, guard: Literal["on", "off"], say: Callable[[str], None]
         connecting = Fleet.connect(members, zones=shapes, groups={"alone": "alone"})
         try:
             fleet = await stack.enter_async_context(connecting)
-            watching.append(asyncio.create_task(waits.watch(fleet._zones.claims)))
+            watching.append(asyncio.create_task(waits.watch(fleet._zones.locks)))
             cell = Cell(random, sims, fleet, monitor, say, STEPS)
             steps = random.randint(4, 12)
             work = fleet.run({name: cell.program(name, Random(random.random()), steps) for name in names})

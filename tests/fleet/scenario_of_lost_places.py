@@ -156,7 +156,7 @@ async def off_while_it_waits(cell: Cell, name: str, arm: Magician, random: Rando
     moving = asyncio.create_task(arm.move_to(**aim(cell, name, random)))
     try:
         await asyncio.sleep(random.uniform(0.5, 2))
-        if any(claim.party.name == name for claim in cell.fleet._zones.claims.waiting):
+        if any(claim.holder.name == name for claim in cell.fleet._zones.locks.waiting):
             cell.monitor.switch_off_and_on(name)
 
         await moving
@@ -241,7 +241,7 @@ async def run(seed: int, say: Callable[[str], None]) -> Figures:
         shapes = {name: shape for name, (_, shape) in zones.items()}
         try:
             fleet = await stack.enter_async_context(Fleet.connect(members, zones=shapes, groups={"alone": "alone"}))
-            watching.append(asyncio.create_task(waits.watch(fleet._zones.claims)))
+            watching.append(asyncio.create_task(waits.watch(fleet._zones.locks)))
             cell = Lost(random, sims, fleet, monitor, say, STEPS)
             steps = random.randint(6, 14)
             async with asyncio.timeout(LONG):

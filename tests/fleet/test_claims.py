@@ -8,7 +8,7 @@ import pytest
 
 from dobot_async import DobotError, MotionStopped
 from dobot_async.fleet import ZoneDeadlock, ZoneOccupied
-from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
+from dobot_async.fleet.zone_locks import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
 
 
 class Asked(ZoneRequest):
@@ -16,17 +16,17 @@ class Asked(ZoneRequest):
 
     __slots__ = ("told",)
 
-    def __init__(self, party: ZoneHolder, zones: Iterable[str], *others: ZoneHolder, patient: bool = True) -> None:
+    def __init__(self, holder: ZoneHolder, zones: Iterable[str], *others: ZoneHolder, patient: bool = True) -> None:
         self.told: list[DobotError | None] = []
-        super().__init__(party, frozenset([party, *others]), frozenset(zones), self.told.append, patient)
+        super().__init__(holder, frozenset([holder, *others]), frozenset(zones), self.told.append, patient)
 
     @property
     def granted(self) -> bool:
         return self.told == [None]
 
 
-def ask(claims: ZoneLocks, party: ZoneHolder, zones: str, *others: ZoneHolder, patient: bool = True) -> Asked:
-    claim = Asked(party, zones, *others, patient=patient)
+def ask(claims: ZoneLocks, holder: ZoneHolder, zones: str, *others: ZoneHolder, patient: bool = True) -> Asked:
+    claim = Asked(holder, zones, *others, patient=patient)
     claims.request(claim)
     return claim
 
@@ -99,16 +99,16 @@ def test_a_holder_that_has_failed_is_not_waited_for() -> None:
 
 def test_who_only_may_be_in_a_zone_beside_another_waits() -> None:
     claims, left = ZoneLocks(), ZoneHolder("left")
-    for party in (left, RIGHT):
-        claims.take(ZoneRequest(party, frozenset([party]), frozenset("A")))
+    for holder in (left, RIGHT):
+        claims.take(ZoneRequest(holder, frozenset([holder]), frozenset("A")))
 
     assert not ask(claims, left, "A").told
 
 
 def test_who_is_in_a_zone_beside_another_may_move_out() -> None:
     claims, left = ZoneLocks(), ZoneHolder("left", inside=frozenset("A"))
-    for party in (left, RIGHT):
-        claims.take(ZoneRequest(party, frozenset([party]), frozenset("A")))
+    for holder in (left, RIGHT):
+        claims.take(ZoneRequest(holder, frozenset([holder]), frozenset("A")))
 
     assert claims.holders("A") == [left, RIGHT]
     assert ask(claims, left, "AB").granted
@@ -141,8 +141,8 @@ def test_an_arm_that_moves_may_leave_a_zone_by_itself() -> None:
     moving = True
     arm = ZoneHolder("arm", moving=lambda: moving)
     claims = ZoneLocks()
-    for party, zone in ((arm, "A"), (RIGHT, "B")):
-        ask(claims, party, zone)
+    for holder, zone in ((arm, "A"), (RIGHT, "B")):
+        ask(claims, holder, zone)
 
     own, other = ask(claims, arm, "B"), ask(claims, RIGHT, "A")
     assert not own.told

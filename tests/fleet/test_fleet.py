@@ -15,8 +15,8 @@ from dobot_async.arms.base import Arm
 from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BarrierBroken, Member
 from dobot_async.fleet.fleet import OnFailure
+from dobot_async.fleet.fleet_arm import FleetArm
 from dobot_async.fleet.guard import Mode
-from dobot_async.fleet.seat import FleetArm
 from dobot_async.simulator import Faults, Simulation, simulate
 
 NEAR, FAR, TOO_FAR = (220.0, 0.0, 40.0), (240.0, 60.0, 60.0), (400.0, 0.0, 40.0)

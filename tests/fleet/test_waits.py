@@ -23,7 +23,7 @@ from waits import Scene, Wait, named
 
 from dobot_async import DobotError, MotionStopped
 from dobot_async.fleet import ZoneDeadlock, ZoneOccupied
-from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
+from dobot_async.fleet.zone_locks import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
 
 ZONES = "ABC"
 ARMS = "abcd"
@@ -56,14 +56,14 @@ class Doer:
     paused: AbstractContextManager[None] | None = None
 
     def __post_init__(self) -> None:
-        self.party = ZoneHolder(f"program {self.name}")
+        self.holder = ZoneHolder(f"program {self.name}")
 
     def __repr__(self) -> str:
         return self.name
 
     def line(self) -> frozenset[ZoneHolder]:
         """As whom it acts."""
-        return frozenset([self.party]) | (self.parent.line() if self.parent else frozenset())
+        return frozenset([self.holder]) | (self.parent.line() if self.parent else frozenset())
 
 
 @dataclass(eq=False, repr=False)
@@ -88,7 +88,7 @@ class Arm:
     behind: list[tuple[Doer, Then]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.party = ZoneHolder(self.name, moving=lambda: self.moves)
+        self.holder = ZoneHolder(self.name, moving=lambda: self.moves)
 
     def __repr__(self) -> str:
         return self.name
@@ -130,8 +130,8 @@ class Cell(RuleBasedStateMachine):
     @invariant()
     def zones_are_held_by_whom_they_were_given(self) -> None:
         for zone in ZONES:
-            holders = {claim.party.name for claim, zones in self.holds.items() if zone in zones}
-            assert {party.name for party in self.claims.holders(zone)} == holders
+            holders = {claim.holder.name for claim, zones in self.holds.items() if zone in zones}
+            assert {holder.name for holder in self.claims.holders(zone)} == holders
 
     @invariant()
     def who_waits_is_known_to_wait(self) -> None:
@@ -142,7 +142,7 @@ class Cell(RuleBasedStateMachine):
     def command(self, doer: Doer) -> None:
         """A program moves an arm, mostly its own."""
         arm = self.arms[self.pick(doer.name * 6 + ARMS if doer.name in ARMS else ARMS)]
-        if not arm.party.failure:
+        if not arm.holder.failure:
             go = partial(self.go, doer, arm, jogs=self.pick([False] * 4 + [True]))
             self.take_turn(doer, arm, go)
 
@@ -155,12 +155,12 @@ class Cell(RuleBasedStateMachine):
 
         arm.driver = doer
         claim = ZoneRequest(
-            arm.party,
-            doer.line() | {arm.party},
+            arm.holder,
+            doer.line() | {arm.holder},
             frozenset(self.pick(WAYS)),
             patient=self.pick([True] * 4 + [False]),
             stuck=self.driven(doer),
-            asker=doer.party,
+            asker=doer.holder,
             parked=partial(self.parked, doer),
         )
         self.ask(doer, claim, granted)
@@ -172,14 +172,14 @@ class Cell(RuleBasedStateMachine):
 
     def start_together(self, doer: Doer) -> None:
         """A program starts two arms at one instant, each with a way of its own."""
-        free = [arm for arm in self.arms.values() if not (arm.turn or arm.behind or arm.party.failure)]
+        free = [arm for arm in self.arms.values() if not (arm.turn or arm.behind or arm.holder.failure)]
         if len(free) < 2:
             return
 
         arms = [free[0], self.pick(free[1:])]
         ways = dict(zip(self.pick(list(permutations(ZONES, 2))), arms, strict=True))
         for arm in arms:
-            arm.turn, arm.commanding, arm.driver = doer, (doer.party,), doer
+            arm.turn, arm.commanding, arm.driver = doer, (doer.holder,), doer
 
         def granted() -> None:
             for zone, arm in ways.items():
@@ -188,13 +188,13 @@ class Cell(RuleBasedStateMachine):
 
             self.give_back(claim)
 
-        movers = frozenset(arm.party for arm in arms)
+        movers = frozenset(arm.holder for arm in arms)
         claim = ZoneRequest(
             ZoneHolder("the start"),
             doer.line() | movers,
             frozenset(ways),
             stuck=self.driven(doer),
-            asker=doer.party,
+            asker=doer.holder,
             movers=movers,
             parked=partial(self.parked, doer),
         )
@@ -202,10 +202,10 @@ class Cell(RuleBasedStateMachine):
 
     def hold(self, doer: Doer) -> None:
         """A program asks for zones for itself."""
-        its = frozenset([self.arms[doer.name].party] if doer.name in ARMS else [])
+        its = frozenset([self.arms[doer.name].holder] if doer.name in ARMS else [])
         own = doer.line() | its | self.driven(doer)
         zones = frozenset(self.pick(WAYS))
-        self.ask(doer, ZoneRequest(doer.party, own, zones, parked=partial(self.parked, doer)), lambda: None)
+        self.ask(doer, ZoneRequest(doer.holder, own, zones, parked=partial(self.parked, doer)), lambda: None)
 
     def meet(self, doer: Doer) -> None:
         """A program comes to the barrier of all."""
@@ -243,7 +243,7 @@ class Cell(RuleBasedStateMachine):
         if any(each.alive and each.parent is doer for each in self.doers.values()):
             return
 
-        for claim in self.held_by(doer.party):
+        for claim in self.held_by(doer.holder):
             self.give_back(claim)
 
         for arm in self.arms.values():
@@ -266,7 +266,7 @@ class Cell(RuleBasedStateMachine):
 
     def rest(self, arm: Arm) -> None:
         """An arm comes to rest, somewhere where it was let, or it does not tell where."""
-        held = self.held_by(arm.party)
+        held = self.held_by(arm.holder)
         stays = frozenset(self.pick([*PLACES, ZONES, ZONES]))
         arm.moves = False
         for claim in held:
@@ -274,7 +274,7 @@ class Cell(RuleBasedStateMachine):
             if not self.holds[claim]:
                 del self.holds[claim]
 
-        arm.party.inside &= stays
+        arm.holder.inside &= stays
         self.claims.keep(held, stays)
 
     def look(self, arm: Arm) -> None:
@@ -283,18 +283,18 @@ class Cell(RuleBasedStateMachine):
 
     def turn_up(self, arm: Arm) -> None:
         """An arm is where it was not known to be."""
-        arm.party.inside = frozenset(self.pick(PLACES))
+        arm.holder.inside = frozenset(self.pick(PLACES))
         self.take(arm, self.pick(WAYS))
 
     def fail(self, arm: Arm) -> None:
         """An arm fails."""
-        arm.party.failure = self.ending = MotionStopped("it failed")
-        self.claims.fail([arm.party], self.ending)
+        arm.holder.failure = self.ending = MotionStopped("it failed")
+        self.claims.fail([arm.holder], self.ending)
 
     def recover(self, arm: Arm) -> None:
         """An arm works again, and stands in no zone."""
-        arm.party.failure, arm.party.inside, arm.moves = None, frozenset(), False
-        held = self.held_by(arm.party)
+        arm.holder.failure, arm.holder.inside, arm.moves = None, frozenset(), False
+        held = self.held_by(arm.holder)
         for claim in held:
             del self.holds[claim]
 
@@ -303,7 +303,7 @@ class Cell(RuleBasedStateMachine):
     def stop(self, arm: Arm) -> None:
         """An arm is stopped."""
         self.ending = MotionStopped("a stop")
-        self.claims.interrupt(arm.party, self.ending)
+        self.claims.interrupt(arm.holder, self.ending)
 
     def stop_all(self, _: Arm) -> None:
         """All are stopped."""
@@ -314,24 +314,24 @@ class Cell(RuleBasedStateMachine):
     # What becomes of it.
 
     def scene(self) -> Scene:
-        held = [(claim.party, zones) for claim, zones in self.holds.items()]
+        held = [(claim.holder, zones) for claim, zones in self.holds.items()]
         return Scene(held, list(self.waiting), list(self.pauses))
 
     def ready(self) -> list[Doer]:
         return [doer for doer in self.doers.values() if doer.alive and not doer.wait and not doer.then]
 
-    def held_by(self, *parties: ZoneHolder) -> list[ZoneRequest]:
-        return [claim for claim in self.holds if claim.party in parties]
+    def held_by(self, *holders: ZoneHolder) -> list[ZoneRequest]:
+        return [claim for claim in self.holds if claim.holder in holders]
 
     def in_doubt(self) -> list[Doer]:
         return [doer for doer in self.doers.values() if doer.wait and not doer.then]
 
     def driven(self, doer: Doer) -> frozenset[ZoneHolder]:
-        return frozenset(arm.party for arm in self.arms.values() if arm.driver is doer)
+        return frozenset(arm.holder for arm in self.arms.values() if arm.driver is doer)
 
-    def parked(self, doer: Doer, party: ZoneHolder) -> bool:
+    def parked(self, doer: Doer, holder: ZoneHolder) -> bool:
         """Whether nobody is left who would move an arm while a program waits."""
-        arm, own = self.arms.get(party.name), doer
+        arm, own = self.arms.get(holder.name), doer
         while own.parent:
             own = own.parent
 
@@ -343,7 +343,7 @@ class Cell(RuleBasedStateMachine):
     def absent(self, doer: Doer) -> list[ZoneHolder]:
         """Who keeps one who has come from going on."""
         return (
-            [self.doers[name].party for name in ARMS if self.doers[name] not in self.come] if doer in self.come else []
+            [self.doers[name].holder for name in ARMS if self.doers[name] not in self.come] if doer in self.come else []
         )
 
     def open(self) -> None:
@@ -355,7 +355,7 @@ class Cell(RuleBasedStateMachine):
     def take_turn(self, doer: Doer, arm: Arm, go: Then) -> None:
         """A program waits until nobody else commands an arm."""
         if arm.turn is None:
-            arm.turn, arm.commanding = doer, (doer.party,)
+            arm.turn, arm.commanding = doer, (doer.holder,)
             go()
         elif arm.turn is not doer and self.pause(doer, f"to command {arm.name} behind", lambda: arm.commanding):
             arm.behind.append((doer, go))
@@ -375,12 +375,12 @@ class Cell(RuleBasedStateMachine):
 
     def begin_turn(self, doer: Doer, arm: Arm, go: Then) -> None:
         self.wake(doer)
-        arm.commanding = (doer.party,)
+        arm.commanding = (doer.holder,)
         go()
 
     def pause(self, doer: Doer, what: str, awaited: Callable[[], list[ZoneHolder] | tuple[ZoneHolder, ...]]) -> bool:
         """A program waits for others; False if it was told that it would do so for ever."""
-        pause = ProgramWait(what, doer.party, self.driven(doer) | {doer.party}, awaited)
+        pause = ProgramWait(what, doer.holder, self.driven(doer) | {doer.holder}, awaited)
         self.pauses.append(pause)
         doer.wait, doer.paused = pause, self.claims.pausing(pause)
         try:
@@ -402,7 +402,7 @@ class Cell(RuleBasedStateMachine):
         doer.paused.__exit__(None, None, None)
 
     def take(self, arm: Arm, zones: str) -> None:
-        claim = ZoneRequest(arm.party, frozenset([arm.party]), frozenset(zones))
+        claim = ZoneRequest(arm.holder, frozenset([arm.holder]), frozenset(zones))
         self.holds[claim] = claim.zones
         self.claims.take(claim)
 
@@ -463,13 +463,13 @@ ACTIONS: dict[Callable[[Cell, Any], None], tuple[int, Callable[[Cell], Sequence[
     Cell.end: (1, lambda cell: [doer for doer in cell.doers.values() if not doer.wait and not doer.then]),
     Cell.give_up: (2, Cell.in_doubt),
     Cell.go_on: (20, lambda cell: [doer for doer in cell.doers.values() if doer.then]),
-    Cell.give_back: (6, lambda cell: cell.held_by(*(doer.party for doer in cell.ready()))),
+    Cell.give_back: (6, lambda cell: cell.held_by(*(doer.holder for doer in cell.ready()))),
     Cell.end_jog: (2, lambda cell: [arm for arm in all_arms(cell) if arm.jogged and arm.turn in cell.ready()]),
     Cell.rest: (8, lambda cell: [arm for arm in all_arms(cell) if arm.moves]),
     Cell.look: (1, all_arms),
     Cell.turn_up: (1, all_arms),
-    Cell.fail: (1, lambda cell: [arm for arm in all_arms(cell) if not arm.party.failure]),
-    Cell.recover: (10, lambda cell: [arm for arm in all_arms(cell) if arm.party.failure]),
+    Cell.fail: (1, lambda cell: [arm for arm in all_arms(cell) if not arm.holder.failure]),
+    Cell.recover: (10, lambda cell: [arm for arm in all_arms(cell) if arm.holder.failure]),
     Cell.stop: (1, all_arms),
     Cell.stop_all: (1, all_arms),
 }

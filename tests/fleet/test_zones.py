@@ -13,7 +13,7 @@ from virtual import virtual
 from dobot_async import ArmAlarm, DobotError, Fleet, Jog, Magician, MotionStopped, PTPMode, ReplyTimeout
 from dobot_async.arms.magician import commands as c
 from dobot_async.fleet import BaseFrame, Box, Cylinder, Member, ZoneDeadlock, ZoneOccupied
-from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneRequest
 from dobot_async.fleet.zones import Zones
 from dobot_async.simulator import Simulation, simulate
 
@@ -286,16 +286,16 @@ async def test_a_stop_ends_a_claim_that_is_not_judged_yet() -> None:
         await caught_up.wait()
 
     zones.guards.append(catch_up)
-    zones.claims.take(ZoneRequest(arms["left"], frozenset([arms["left"]]), frozenset(["belt"])))
-    claim = ZoneRequest(arms["right"], frozenset([arms["right"]]), frozenset(["belt"]))
-    asking = asyncio.create_task(zones.claim(claim, None))
+    zones.locks.take(ZoneRequest(arms["left"], frozenset([arms["left"]]), frozenset(["belt"])))
+    request = ZoneRequest(arms["right"], frozenset([arms["right"]]), frozenset(["belt"]))
+    asking = asyncio.create_task(zones.request(request, None))
     await asyncio.sleep(1)
-    zones.claims.interrupt(arms["right"], MotionStopped("enough"))
+    zones.locks.interrupt(arms["right"], MotionStopped("enough"))
     caught_up.set()
     with pytest.raises(MotionStopped, match="enough"):
         await asking
 
-    assert not zones.claims.waiting
+    assert not zones.locks.waiting
 
 
 @virtual

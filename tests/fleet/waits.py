@@ -1,7 +1,7 @@
 """Who can never go on: a wait-for graph, built from what claims and pauses say, that shares no code with `ZoneLocks`.
 
 A wait leads to another one if that has to end before. A claim waits for the holders of its zones, none of whom leaves
-before all waits have ended in which it is stuck, unless it moves; a pause waits for parties, none of whom comes before
+before all waits have ended in which it is stuck, unless it moves; a pause waits for holders, none of whom comes before
 the waits of its own have ended. Who can come to no end of such a way was to be told, and so was a claim for which
 everything is free.
 """
@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dobot_async.fleet.claims import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
+from dobot_async.fleet.zone_locks import ProgramWait, ZoneHolder, ZoneLocks, ZoneRequest
 
 __all__ = ["Scene", "Wait", "end", "named", "watch"]
 
@@ -39,7 +39,7 @@ class Scene:
     @classmethod
     def of(cls, claims: ZoneLocks) -> Scene:
         """What is the case in a cell."""
-        held = [(claim.party, claim.zones) for claim in claims.held]
+        held = [(claim.holder, claim.zones) for claim in claims.held]
         return cls(held, claims.waiting, list(claims._pauses))
 
     def forgotten(self) -> list[tuple[Wait, str]]:
@@ -50,25 +50,25 @@ class Scene:
 
     def in_the_way(self, claim: ZoneRequest) -> list[ZoneHolder]:
         """Who holds what it is for; where it is known to be already, it may go on beside others."""
-        wanted = claim.zones - claim.party.inside
-        return [party for party, zones in self.held if party not in claim.own and wanted & zones]
+        wanted = claim.zones - claim.holder.inside
+        return [holder for holder, zones in self.held if holder not in claim.own and wanted & zones]
 
     def in_vain(self, claim: ZoneRequest) -> Iterator[str]:
         """Whether it waits for somebody who will never leave."""
-        for party in self.in_the_way(claim):
-            if party.failure:
-                yield f"{party.name} has failed"
-            elif claim.parked(party) and not party.moving():
-                yield f"nobody moves {party.name}"
+        for holder in self.in_the_way(claim):
+            if holder.failure:
+                yield f"{holder.name} has failed"
+            elif claim.parked(holder) and not holder.moving():
+                yield f"nobody moves {holder.name}"
 
     def before(self, wait: Wait) -> list[Wait]:
         """What has to end before a wait does, whoever comes first."""
         waits: list[Wait] = [*self.claims, *self.pauses]
         if isinstance(wait, ProgramWait):
-            return [each for party in wait.awaited() for each in waits if each.asker is party]
+            return [each for holder in wait.awaited() for each in waits if each.asker is holder]
 
-        resting = [party for party in self.in_the_way(wait) if not party.moving()]
-        return [each for party in resting for each in waits if party in each.stuck]
+        resting = [holder for holder in self.in_the_way(wait) if not holder.moving()]
+        return [each for holder in resting for each in waits if holder in each.stuck]
 
     def earlier(self, claim: ZoneRequest) -> list[ZoneRequest]:
         """Those that came first for the same."""

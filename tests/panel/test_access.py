@@ -19,7 +19,7 @@ from dobot_async import ConnectFailed
 from dobot_async.arms.magician import commands as c
 from dobot_async.panel import Role, panel
 from dobot_async.panel.access import Access
-from dobot_async.panel.doorkeeper import MOST
+from dobot_async.panel.pending_connections import MOST
 
 OPERATOR, VIEWER = "operator-token-4711", "viewer-token-0815"
 CERTIFICATE = Path(__file__).parents[1] / "bridge" / "localhost.pem"
@@ -345,7 +345,7 @@ async def test_uploads_are_not_taken_without_end(rig: Shown) -> None:
 
 
 async def test_who_never_asks_is_cut_and_keeps_nobody_out(rig: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dobot_async.panel.doorkeeper.HANDSHAKE", 0.5)
+    monkeypatch.setattr("dobot_async.panel.pending_connections.HANDSHAKE", 0.5)
     connections = [await asyncio.open_connection("127.0.0.1", rig.panel.port) for _ in range(MOST + 40)]
     for _, writer in connections[::2]:
         writer.write(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: ")  # a request that does not end

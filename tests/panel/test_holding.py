@@ -12,7 +12,7 @@ from dobot_async import Magician
 from dobot_async.arms.magician import commands as c
 from dobot_async.fleet.member import Member
 from dobot_async.panel import Role
-from dobot_async.panel.holding import PATIENCE
+from dobot_async.panel.hold_to_run import PATIENCE
 from dobot_async.simulator import Faults, Simulation, simulate
 
 pytestmark = pytest.mark.virtual_time

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dobot_async.simulator.device.device import Activity, Device, DeviceFault, DeviceOptions, Executed, Vector, Work
-from dobot_async.simulator.device.path import joint_leg, travel
+from dobot_async.simulator.device.path import joint_segment, travel
 from dobot_async.simulator.device.profile import SpeedLimits
 
 PACE = SpeedLimits((100.0, 100.0), (200.0, 200.0))
@@ -62,14 +62,14 @@ def move(*target: float, name: str = "move") -> Work:
     """Moves the joints; 100 degrees take 1.5 s."""
 
     def begin(device: Device) -> Activity:
-        return travel([joint_leg(device.joints, target, PACE)])
+        return travel([joint_segment(device.joints, target, PACE)])
 
     return Work(name, begin, moves=True)
 
 
 def move_into_fault(*target: float) -> Work:
     def begin(device: Device) -> Activity:
-        return travel([joint_leg(device.joints, target, PACE, fault=DeviceFault(END_FAULT))])
+        return travel([joint_segment(device.joints, target, PACE, fault=DeviceFault(END_FAULT))])
 
     return Work("strand", begin, moves=True)
 
@@ -88,7 +88,7 @@ def trigger(key: str = "pin", level: float = 1.0) -> Work:
 def jog(limit: float) -> Work:
     def begin(device: Device) -> Activity:
         there = (limit, device.joints[1])
-        return travel([joint_leg(device.joints, there, PACE, fault=DeviceFault(LIMIT), leave=math.inf)])
+        return travel([joint_segment(device.joints, there, PACE, fault=DeviceFault(LIMIT), leave=math.inf)])
 
     return Work("jog", begin, moves=True)
 

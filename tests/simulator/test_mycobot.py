@@ -17,7 +17,7 @@ from dobot_async.arms.mycobot.standstill import turned
 from dobot_async.simulator import MyCobotQuirks, SimulatedMyCobot
 from dobot_async.simulator.mycobot.elbow import elbow_angle, turn_elbow
 from dobot_async.simulator.mycobot.kinematics import KINEMATICS, Chain
-from dobot_async.simulator.mycobot.segments import NO_INVERSE, NO_LINE, Ways
+from dobot_async.simulator.mycobot.segments import NO_INVERSE, NO_LINE, SegmentPlanner
 
 
 class Bench:
@@ -146,7 +146,7 @@ def test_what_cannot_be_reached_is_an_error_and_no_motion() -> None:
 
 
 def test_a_line_through_where_there_are_no_joints_is_none() -> None:
-    ways = Ways(MODELS["mypalletizer260"])
+    ways = SegmentPlanner(MODELS["mypalletizer260"])
     start = (0.0, 30.0, 0.0, 0.0)
     there = (170.0, 30.0, 0.0, 0.0)
     assert NO_LINE != NO_INVERSE

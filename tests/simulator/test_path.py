@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from dobot_async.arms.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.simulator.device.curve import Arc, LineSegment, arc, circle
 from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Vector, Work
-from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg, jump, travel
+from dobot_async.simulator.device.path import Segment, curve_segment, joint_segment, jump, travel
 from dobot_async.simulator.device.profile import Profile, SpeedLimits, shared, trapezoid
 
 JOINTS = SpeedLimits((200.0,) * 4, (400.0,) * 4)
@@ -44,8 +44,8 @@ def at(*point: float) -> Vector:
     return SOLVER.inverse(point)
 
 
-def leg_to(*target: float, start: Vector, pace: SpeedLimits = TOOL) -> Leg:
-    return curve_leg(LineSegment(SOLVER.forward(start), target), start, SOLVER, pace)
+def leg_to(*target: float, start: Vector, pace: SpeedLimits = TOOL) -> Segment:
+    return curve_segment(LineSegment(SOLVER.forward(start), target), start, SOLVER, pace)
 
 
 def code_of(attempt: Callable[[], object]) -> int:
@@ -189,7 +189,7 @@ def test_a_turn_on_the_spot_takes_the_time_of_the_turn() -> None:
 
 
 def test_joints_go_together() -> None:
-    leg = joint_leg((0, 0, 0, 0), (100, 50, -25, 0), JOINTS)
+    leg = joint_segment((0, 0, 0, 0), (100, 50, -25, 0), JOINTS)
     assert leg.at(leg.duration / 2) == pytest.approx((50, 25, -12.5, 0))
     assert leg.end == (100, 50, -25, 0)
 
@@ -228,7 +228,7 @@ def test_a_line_that_leaves_the_reach_for_a_moment_raises_the_alarm(begin: int) 
 def test_an_arc_that_swings_too_far_out() -> None:
     wide = Solver(Kinematics(limits=JointLimits(j3=(-90, 90), fold=(-90, 180))))
     start = wide.inverse((250, 0, 0, 0))
-    leg = curve_leg(arc((250, 0, 0, 0), (350, 0, 50, 0), (250, 0, 100, 0)), start, wide, TOOL)
+    leg = curve_segment(arc((250, 0, 0, 0), (350, 0, 50, 0), (250, 0, 100, 0)), start, wide, TOOL)
     assert leg.fault is not None
     assert leg.fault.code == 0x21
     assert 0 < leg.stop < 0.5
@@ -239,14 +239,14 @@ def test_the_arm_may_move_back_from_beyond_a_limit() -> None:
     back = leg_to(200, 0, 0, 0, start=beyond)
     assert back.fault is None
     assert SOLVER.forward(back.joints(0.5)) == pytest.approx((200, 0, 0, 80))
-    further = curve_leg(LineSegment((200, 0, 0, 160), (200, 0, 0, 190)), beyond, SOLVER, TOOL, must_arrive=False)
+    further = curve_segment(LineSegment((200, 0, 0, 160), (200, 0, 0, 190)), beyond, SOLVER, TOOL, must_arrive=False)
     assert further.fault is not None
     assert (further.fault.code, further.end, further.duration) == (0x22, beyond, 0)
 
 
 def test_an_end_that_need_not_be_reached() -> None:
     line = LineSegment((250, 0, 0, 0), (1250, 0, 0, 0))
-    leg = curve_leg(line, at(*line.start), SOLVER, SLOW, must_arrive=False)
+    leg = curve_segment(line, at(*line.start), SOLVER, SLOW, must_arrive=False)
     assert leg.fault is not None
     assert leg.fault.code in {0x21, 0x22}
     assert SOLVER.forward(leg.end)[0] == pytest.approx(250 + 1000 * leg.stop)
@@ -255,7 +255,7 @@ def test_an_end_that_need_not_be_reached() -> None:
 
 def test_only_the_end_is_looked_at_when_nothing_else_is_asked_for() -> None:
     line = LineSegment((20, -200, 0, -90), (20, 200, 0, 90))
-    leg = curve_leg(line, at(*line.start), SOLVER, TOOL, every=math.inf)
+    leg = curve_segment(line, at(*line.start), SOLVER, TOOL, every=math.inf)
     assert leg.fault is None
     assert leg.joints(0.5) == at(*line.start), "shown where it was last seen"
     assert leg.end == at(*line.end)
@@ -263,7 +263,7 @@ def test_only_the_end_is_looked_at_when_nothing_else_is_asked_for() -> None:
 
 def test_points_of_a_path_keep_their_speed() -> None:
     line = LineSegment((200, 0, 0, 0), (210, 0, 0, 0))
-    leg = curve_leg(line, at(*line.start), SOLVER, TOOL, enter=100, leave=100)
+    leg = curve_segment(line, at(*line.start), SOLVER, TOOL, enter=100, leave=100)
     assert leg.duration == pytest.approx(0.1)
 
 
@@ -276,7 +276,7 @@ def test_six_joints_and_six_coordinates() -> None:
             return point
 
     start, end = (0.0,) * 6, (30.0, 40.0, 0.0, 90.0, 0.0, -180.0)
-    leg = curve_leg(LineSegment(start, end), start, Straight(), SpeedLimits((100.0, 90.0), (1e9, 1e9)))
+    leg = curve_segment(LineSegment(start, end), start, Straight(), SpeedLimits((100.0, 90.0), (1e9, 1e9)))
     assert leg.duration == pytest.approx(2.0, abs=1e-3)
     assert leg.end == end
 
@@ -286,7 +286,7 @@ def test_six_joints_and_six_coordinates() -> None:
 
 def jump_to(
     *target: float, start: Vector, height: float = 20, ceiling: float = 150, straight: bool = False
-) -> list[Leg]:
+) -> list[Segment]:
     across = TOOL if straight else JOINTS
     return jump(start, target, SOLVER, height=height, ceiling=ceiling, vertical=TOOL, across=across, straight=straight)
 
@@ -342,7 +342,7 @@ def device_at(*point: float) -> tuple[Device, list[float]]:
 
 def test_a_jump_in_time() -> None:
     device, now = device_at(250, 0, 0, 0)
-    legs: list[Leg] = []
+    legs: list[Segment] = []
 
     def begin(device: Device) -> Activity:
         legs.extend(jump_to(200, 100, 30, 0, start=device.joints))

@@ -13,9 +13,9 @@ import aiohttp
 from dobot_async import Magician
 from dobot_async.fleet.member import Member
 from dobot_async.panel import Panel, Role, panel
-from dobot_async.panel.desk import Desk
-from dobot_async.panel.session import Session
+from dobot_async.panel.session import PageSession
 from dobot_async.panel.sources import sources_of
+from dobot_async.panel.state import PanelState
 from dobot_async.simulator import Simulation, simulate
 
 __all__ = ["IN_TIME", "Page", "Seen", "Shown", "VirtualPage", "browser", "desk_of", "page", "shown", "until"]
@@ -182,7 +182,7 @@ async def until(condition: Callable[[], object]) -> None:
 class VirtualPage(Seen):
     """A page without a network, for virtual time."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: PageSession) -> None:
         super().__init__()
         self.session = session
 
@@ -216,10 +216,10 @@ class VirtualPage(Seen):
 
 
 @asynccontextmanager
-async def desk_of(arms: Any) -> AsyncIterator[tuple[Desk, Callable[..., VirtualPage]]]:
+async def desk_of(arms: Any) -> AsyncIterator[tuple[PanelState, Callable[..., VirtualPage]]]:
     """What is behind a panel, without its port; and what makes pages."""
     sources, zones, _ = sources_of(arms)
-    desk = Desk(sources, zones, scene=False, stop_all=None)
+    desk = PanelState(sources, zones, scene=False, stop_all=None)
     desk.start()
     reading: list[asyncio.Task[None]] = []
 

@@ -399,7 +399,7 @@ class Writer:
         text, wrap = self.type_of(inner, source)
         call = f"{target}({given})"
         if kind == "block":
-            block, manager = self.sync("twin", "Block"), self.need("contextlib", "AbstractContextManager")
+            block, manager = self.sync("twin", "BlockingContext"), self.need("contextlib", "AbstractContextManager")
             wrap = "cls" if text == "Self" else wrap or self.sync("twin", "same")
             name = "str(url)" if text == "Self" else repr(node.name)
             return f"{manager}[{text}]", [f"        return {block}(lambda: {call}, {wrap}, {name})"]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from virtual import run_virtual, virtual
 
 from dobot_async import Magician
-from dobot_async.endpoints.line_rate import AHEAD, RateLimited, RateLimitedLine, Wired
+from dobot_async.endpoints.line_rate import AHEAD, RateLimited, RateLimitedLine, RateLimitedPeer
 from dobot_async.endpoints.pty import on_pty
 from dobot_async.simulator import simulate
 from dobot_async.transports import open_transport
@@ -143,7 +143,7 @@ async def test_both_ways_have_their_own_line_and_a_client_far_ahead_is_held() ->
     holds: list[bool] = []
     host = Echo()
     slow = RateLimited(host, BAUD)
-    client: Wired[EchoClient] = slow.client(received.extend, lambda: None, ordered=True, hold=holds.append)
+    client: RateLimitedPeer[EchoClient] = slow.client(received.extend, lambda: None, ordered=True, hold=holds.append)
     client.send(bytes(AHEAD + 100))
     assert holds == [True]
     await asyncio.sleep((AHEAD + 100) * BYTE + TICK)
@@ -168,7 +168,7 @@ async def test_a_client_that_has_sent_nothing_leaves_at_once_and_one_that_is_hun
     slow = RateLimited(host, BAUD)
     hung_up: list[int] = []
 
-    def connected() -> Wired[EchoClient]:
+    def connected() -> RateLimitedPeer[EchoClient]:
         return slow.client(lambda _: None, lambda: hung_up.append(1), ordered=True)
 
     slow.leave(connected())

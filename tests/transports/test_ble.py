@@ -198,10 +198,10 @@ def test_a_bad_url_names_what_is_wrong(url: str, wrong: str) -> None:
         open_transport(url, arm="magician").send(None)
 
 
-def seen(name: str = "", address: str = "D8:B0:4C:B3:38:68", *services: str) -> ble_scan.Seen:
+def seen(name: str = "", address: str = "D8:B0:4C:B3:38:68", *services: str) -> ble_scan.SeenDevice:
     """What somebody advertises."""
     device = BLEDevice(address, name or None, {})
-    return ble_scan.Seen(device, name, frozenset(services), connected=False)
+    return ble_scan.SeenDevice(device, name, frozenset(services), connected=False)
 
 
 @pytest.mark.parametrize(
@@ -223,7 +223,7 @@ def seen(name: str = "", address: str = "D8:B0:4C:B3:38:68", *services: str) -> 
         ("0F3C1A55-7A4B-4C7A-9F2E-3F1B2C3D4E5F", seen("WH-BLE 102"), False),
     ],
 )
-def test_who_is_wanted(text: str, who: ble_scan.Seen, fits: bool) -> None:
+def test_who_is_wanted(text: str, who: ble_scan.SeenDevice, fits: bool) -> None:
     assert ble_scan.Wanted(text).fits(who) is fits
 
 
@@ -336,7 +336,7 @@ async def test_an_arm_that_another_program_uses_is_left_alone(
 ) -> None:
     async with opened(module.url) as transport:
         if not of_ours:
-            monkeypatch.setattr(opening, "claim", lambda _: ble_claim.Claim(None))
+            monkeypatch.setattr(opening, "lock_device", lambda _: ble_claim.DeviceLock(None))
 
         with pytest.raises(ConnectFailed, match="else on this computer uses D8:B0:4C:B3:38:68; end it first"):
             await open_transport("ble:", arm="magician")
@@ -359,15 +359,15 @@ async def test_of_two_at_once_one_gets_the_arm(module: BleModule) -> None:
 
 
 def test_a_claim_is_of_one_alone() -> None:
-    first = ble_claim.claim("D8:B0:4C:B3:38:68")
+    first = ble_claim.lock_device("D8:B0:4C:B3:38:68")
     assert first
-    assert ble_claim.claim("D8:B0:4C:B3:38:68") is None
-    other = ble_claim.claim("D8:B0:4C:B3:38:69")
+    assert ble_claim.lock_device("D8:B0:4C:B3:38:68") is None
+    other = ble_claim.lock_device("D8:B0:4C:B3:38:69")
     assert other
     other.drop()
     first.drop()
     first.drop()
-    again = ble_claim.claim("D8:B0:4C:B3:38:68")
+    again = ble_claim.lock_device("D8:B0:4C:B3:38:68")
     assert again
     again.drop()
 
@@ -799,7 +799,7 @@ async def test_an_arm_that_is_found_when_nobody_wants_it_any_more_is_free(
     with pytest.raises(asyncio.CancelledError) as caught:
         await opening
 
-    taken = ble_claim.claim(module.address)
+    taken = ble_claim.lock_device(module.address)
     assert taken, f"it is free only when nobody holds {caught} any more"
     taken.drop()
     assert module.connections == 0

@@ -24,7 +24,7 @@ from dobot_async.arms.magician.arguments import to_choice, to_flag
 from dobot_async.arms.magician.executor import MagicianExecutor
 from dobot_async.arms.magician.following import MagicianFollowing
 from dobot_async.arms.magician.goals import Need, Plan
-from dobot_async.arms.magician.hand import HandGuided
+from dobot_async.arms.magician.hand_guided import HandGuided
 from dobot_async.arms.magician.jogs import Jog
 from dobot_async.arms.magician.keeping import MagicianKeeper, Stand, check_jog
 from dobot_async.arms.magician.kinematics import Joints, Kinematics
@@ -34,12 +34,12 @@ from dobot_async.arms.magician.ranges import check_ranges
 from dobot_async.arms.magician.reach import check_reach as check_target
 from dobot_async.arms.magician.readings import Readings
 from dobot_async.arms.magician.sensors import Sensors
-from dobot_async.arms.magician.traced import FRAMES
+from dobot_async.arms.magician.trace_words import FRAMES
 from dobot_async.arms.magician.verbs import Verbs
 from dobot_async.arms.magician.wifi import WiFi
 from dobot_async.arms.session import arm_session, check_options, open_in_time, run_owned
 from dobot_async.errors import DobotError, MotionStopped
-from dobot_async.traces.recorder import Record, Recording
+from dobot_async.traces.recorder import Record, RecordSettings
 
 __all__ = ["Jog", "Magician"]
 
@@ -153,7 +153,7 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
                 workspace=kept,
             )
 
-        recording = Recording(record, FRAMES, "magician", (floor, ceiling))
+        recording = RecordSettings(record, FRAMES, "magician", (floor, ceiling))
         stop = control and on_error == "stop"
         async with arm_session(url, timeout, reopen, build, stop_on_error=stop, recording=recording) as arm:
             assert isinstance(arm, cls)

@@ -33,5 +33,5 @@ FAMILY = Family(
     cli="dobot_async.cli.arms.magician:MAGICIAN",
     fleet="dobot_async.fleet.families:MAGICIAN",
     program="dobot_async.arms.magician.vocabulary:VOCABULARY",
-    replay="dobot_async.arms.magician.traced:retimed",
+    replay="dobot_async.arms.magician.trace_words:retimed",
 )

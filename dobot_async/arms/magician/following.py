@@ -67,13 +67,13 @@ class MagicianFollowing:
         """
         check_choice("way", way, "replace", "clear")
         queue = self._queue()
-        strategy = Led(self._link, self._executor, queue, way)
+        strategy = MagicianStrategy(self._link, self._executor, queue, way)
         return follow_target(
             self._link, queue, strategy, rate=rate, max_speed=max_speed, max_turn=max_turn, stale=stale
         )
 
 
-class Led:
+class MagicianStrategy:
     """See `Strategy`."""
 
     axes = ("x", "y", "z", "r")

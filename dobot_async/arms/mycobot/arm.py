@@ -28,11 +28,11 @@ from dobot_async.arms.mycobot.models import DEFAULT, CobotModel, Range, model_of
 from dobot_async.arms.mycobot.opening import BARRIERS, GAP, greet, opened, reply_times, with_baud
 from dobot_async.arms.mycobot.queue import CobotQueue
 from dobot_async.arms.mycobot.readings import Readings
-from dobot_async.arms.mycobot.traced import frames_of
+from dobot_async.arms.mycobot.trace_words import frames_of
 from dobot_async.arms.mycobot.verbs import Verbs
 from dobot_async.arms.session import arm_session, check_options, run_owned
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
-from dobot_async.traces.recorder import Record, Recording
+from dobot_async.traces.recorder import Record, RecordSettings
 
 __all__ = ["BARRIERS", "GAP", "MyCobot", "opened", "with_baud"]
 
@@ -178,7 +178,7 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
             reopen,
             lambda transport, found: build(connected(transport, found)),
             stop_on_error=control and on_error == "stop",
-            recording=Recording(record, frames_of(arm_model), model, (floor, ceiling)),
+            recording=RecordSettings(record, frames_of(arm_model), model, (floor, ceiling)),
         ) as arm:
             yield arm
             unsent = arm.queue.unsent

@@ -63,7 +63,7 @@ class CobotFollowing:
             MotionUnknown: The arm is silent, or the link was lost.
             ConnectionLost: The link is gone.
         """
-        strategy = Led(self._channel, self._runner, self._tolerance, speed)
+        strategy = CobotStrategy(self._channel, self._runner, self._tolerance, speed)
         return follow_target(
             self._channel.link,
             self._queue(),
@@ -75,7 +75,7 @@ class CobotFollowing:
         )
 
 
-class Led:
+class CobotStrategy:
     """See `Strategy`."""
 
     turns = True

@@ -43,7 +43,7 @@ class GripperReading:
     value: int | None
 
 
-class Grip:
+class GripperMotion:
     """One command.
 
     Args:
@@ -153,7 +153,7 @@ async def run_gripper(
     if isinstance(value, c.SetGripperState) and value.state not in GOAL:
         await channel.through_outages(partial(channel.tell, command, value, timeout=SILENCE))
     else:
-        await Grip(channel, value).run(command, value)
+        await GripperMotion(channel, value).run(command, value)
 
 
 def check_gripper(value: int) -> int:

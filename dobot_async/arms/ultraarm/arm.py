@@ -31,10 +31,10 @@ from dobot_async.arms.ultraarm.readings import Readings
 from dobot_async.arms.ultraarm.runner import UltraArmRunner
 from dobot_async.arms.ultraarm.state import JOGS
 from dobot_async.arms.ultraarm.tools import darken
-from dobot_async.arms.ultraarm.traced import FRAMES
+from dobot_async.arms.ultraarm.trace_words import FRAMES
 from dobot_async.arms.ultraarm.verbs import Pump, Verbs
 from dobot_async.errors import DobotError, MotionStopped
-from dobot_async.traces.recorder import Record, Recording
+from dobot_async.traces.recorder import Record, RecordSettings
 
 __all__ = ["UltraArm", "UltraArmJog"]
 
@@ -170,7 +170,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 workspace=kept,
             )
 
-        recording = Recording(record, FRAMES, "ultraarm", (floor, ceiling))
+        recording = RecordSettings(record, FRAMES, "ultraarm", (floor, ceiling))
         stop = control and on_error == "stop"
         async with arm_session(url, timeout, reopen, build, stop_on_error=stop, recording=recording) as arm:
             assert isinstance(arm, cls)

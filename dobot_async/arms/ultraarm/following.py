@@ -70,7 +70,7 @@ class UltraArmFollowing:
             MotionUnknown: The arm is silent, or the link was lost.
             ConnectionLost: The link is gone.
         """
-        strategy = Led(
+        strategy = UltraArmStrategy(
             self._runner,
             self._tolerance,
             to_float(max_speed, "max_speed"),
@@ -88,7 +88,7 @@ class UltraArmFollowing:
         )
 
 
-class Led:
+class UltraArmStrategy:
     """See `Strategy`."""
 
     axes = AXES

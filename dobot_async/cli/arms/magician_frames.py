@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from dobot_async.arms.magician.frame import Frame, Parser
-from dobot_async.arms.magician.traced import raw, readings
+from dobot_async.arms.magician.trace_words import raw, readings
 from dobot_async.traces.words import REPLY, REQUEST
 
 __all__ = ["pieces"]

@@ -27,7 +27,7 @@ from dobot_async.cli.trace import tracing
 from dobot_async.errors import DobotError
 from dobot_async.fleet.cell import Cell, parse_cell
 from dobot_async.fleet.fleet import Fleet
-from dobot_async.fleet.seat import Member
+from dobot_async.fleet.fleet_arm import Member
 from dobot_async.program import ProgramError
 from dobot_async.program.text import lines_in
 from dobot_async.traces import TraceFile

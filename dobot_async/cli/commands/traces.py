@@ -11,7 +11,7 @@ import click
 
 from dobot_async.cli.output import words
 from dobot_async.cli.session import CommandSession
-from dobot_async.traces.figures import CommandFigures, Figures, figures, percentile
+from dobot_async.traces.figures import CommandFigures, TraceFigures, figures, percentile
 from dobot_async.traces.reader import Trace, TraceLine, TraceProblem, read_trace
 
 __all__ = ["trace"]
@@ -147,7 +147,7 @@ def other(line: TraceLine) -> str:
 TEXTS: dict[str, Callable[[TraceLine], str]] = {"frame": frame, "motion": motion, "junk": junk}
 
 
-def summary(found: Figures) -> dict[str, Any]:
+def summary(found: TraceFigures) -> dict[str, Any]:
     """The figures as JSON."""
     return {
         "seconds": round(found.seconds, 6),
@@ -173,7 +173,7 @@ def command_summary(command: CommandFigures) -> dict[str, Any]:
 PERCENTS = {"p50": 50.0, "p95": 95.0, "max": 100.0}
 
 
-def stats_text(found: Figures) -> Iterator[str]:
+def stats_text(found: TraceFigures) -> Iterator[str]:
     """Yields the figures as lines."""
     sent, received = found.frames
     yield f"{found.seconds:.3f} s, {sent} frames sent, {received} received, {found.junk} bytes of junk"

@@ -9,7 +9,7 @@ from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontext
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from dobot_async.panel.problems import Refusal
+from dobot_async.panel.problems import PanelRefusal
 from dobot_async.teaching.registry import taught
 from dobot_async.toolpath import reach_of
 
@@ -252,35 +252,35 @@ class ArmView(ABC):
 
     async def conveyor(self, speed: int, motor: int) -> None:  # noqa: ARG002 - where there is one
         """Run a belt's motor, pulses/s."""
-        raise Refusal("unsupported", f"{self.title} has no motor for a belt")
+        raise PanelRefusal("unsupported", f"{self.title} has no motor for a belt")
 
     async def rail(self, on: bool) -> None:  # noqa: ARG002 - as above
         """Declare that the arm stands on a rail."""
-        raise Refusal("unsupported", f"{self.title} has no rail")
+        raise PanelRefusal("unsupported", f"{self.title} has no rail")
 
     async def move_rail(self, mm: float) -> None:  # noqa: ARG002 - as above
         """Drive along the rail."""
-        raise Refusal("unsupported", f"{self.title} has no rail")
+        raise PanelRefusal("unsupported", f"{self.title} has no rail")
 
     async def configure_pin(self, pin: int, use: str) -> None:  # noqa: ARG002 - as above
         """Say what a pin is used for."""
-        raise Refusal("unsupported", f"{self.title} has no pins")
+        raise PanelRefusal("unsupported", f"{self.title} has no pins")
 
     async def output(self, pin: int, level: bool) -> None:  # noqa: ARG002 - as above
         """Set an output."""
-        raise Refusal("unsupported", f"{self.title} has no outputs")
+        raise PanelRefusal("unsupported", f"{self.title} has no outputs")
 
     async def input(self, pin: int) -> bool:  # noqa: ARG002 - as above
         """Return the level of an input."""
-        raise Refusal("unsupported", f"{self.title} has no inputs")
+        raise PanelRefusal("unsupported", f"{self.title} has no inputs")
 
     async def end_effector(self, tool: str) -> None:  # noqa: ARG002 - as above
         """Say which tool is on the arm."""
-        raise Refusal("unsupported", f"{self.title} is not told of its tool")
+        raise PanelRefusal("unsupported", f"{self.title} is not told of its tool")
 
     async def power(self) -> None:
         """Let the motors hold."""
-        raise Refusal("unsupported", f"the motors of {self.title} always hold")
+        raise PanelRefusal("unsupported", f"the motors of {self.title} always hold")
 
     async def rail_place(self) -> float | None:
         """Return where the arm stands on its rail; None if it has none."""

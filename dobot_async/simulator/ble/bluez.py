@@ -1,6 +1,6 @@
 """BlueZ, as far as a BLE client sees it, on a bus of its own: the simulated arm over Bluetooth with no radio.
 
-    client --> bleak, unchanged --> D-Bus --> BlueZ (here) --> Module --> Air --> Uart --> simulated arm
+    client --> bleak, unchanged --> D-Bus --> BlueZ (here) --> BleModule --> LinkLayer --> Uart --> simulated arm
 
 What the real one does is done as it does it: one scan for each client, writes without response that are answered at
 once and queued, InProgress while another is under way, connections that outlive the program that made them, the four

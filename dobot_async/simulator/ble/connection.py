@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from dbus_fast import Message
 
-from dobot_async.simulator.ble.link_layer import Air, RadioSettings, SerialBridge
+from dobot_async.simulator.ble.link_layer import LinkLayer, RadioSettings, SerialBridge
 from dobot_async.simulator.simulation import SimulatedClient, Simulation
 
 __all__ = ["CONNECT", "SUBSCRIBE", "WRITE", "GattConnection"]
@@ -25,12 +25,12 @@ class GattConnection:
     """One connection: what is on its way, the calls that wait for it, and what happens later if it lasts.
 
     Attributes:
-        air: What is on its way.
+        link_layer: What is on its way.
         line: To the arm, once the connection is there.
     """
 
     def __init__(self, radio: RadioSettings) -> None:
-        self.air = Air(radio)
+        self.link_layer = LinkLayer(radio)
         self.line: SerialBridge | None = None
         self._loop = asyncio.get_running_loop()
         self._waiting: dict[str, Message] = {}
@@ -63,7 +63,7 @@ class GattConnection:
 
     def in_events(self, events: int, then: Callable[[], None]) -> None:
         """Does something after some connection events."""
-        self._timers.append(self.air.after(events, then))
+        self._timers.append(self.link_layer.after(events, then))
 
     def later(self, seconds: float, then: Callable[[], None]) -> None:
         """Does something after a time."""
@@ -74,7 +74,7 @@ class GattConnection:
         for timer in self._timers:
             timer.cancel()
 
-        self.air.close()
+        self.link_layer.close()
         if self.line:
             self.line.end()
 

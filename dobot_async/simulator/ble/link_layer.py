@@ -1,4 +1,4 @@
-"""The air between a computer and a simulated arm's BLE module, in connection events; and the module's serial port.
+"""A BLE connection's link layer between a computer and the simulated module, by connection events; and the serial port.
 
     computer --> packets that wait --> connection event --> module --> 115200 baud --> arm
              <-- packets that wait <--    (each interval)    <-- module <--             <--
@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["Air", "RadioSettings", "SerialBridge", "Uart", "round_trip"]
+__all__ = ["LinkLayer", "RadioSettings", "SerialBridge", "Uart", "round_trip"]
 
 BAUD_PER_BYTE = 10 / 115200
 LEAST_MTU, MOST_MTU = 23, 517
@@ -53,7 +53,7 @@ class RadioSettings:
         return self.mtu - ATT_HEADER
 
 
-class Air:
+class LinkLayer:
     """One connection: what waits for its next event, each way."""
 
     def __init__(self, radio: RadioSettings) -> None:
@@ -144,7 +144,7 @@ class Uart:
 
 
 class SerialBridge:
-    """The serial line of one connection to the arm: what has reached the module goes on, even if the air is gone.
+    """The serial line of one connection to the arm: what reached the module is sent even if the connection is gone.
 
     Args:
         deliver: Takes what has reached the arm.

@@ -142,7 +142,7 @@ class BleModule:
         size = self.radio.payload
         if self._connection:
             for at in range(0, len(data), size):
-                self._connection.air.back(partial(self._notify, data[at : at + size]))
+                self._connection.link_layer.back(partial(self._notify, data[at : at + size]))
 
     def change_mtu(self, mtu: int) -> None:
         """Both sides agree on another length of packets."""
@@ -210,7 +210,7 @@ class BleModule:
             self._bluez.answer(call)
 
         if not self.stuck:
-            connection.air.there(lambda: self._arrive(data, confirm=kind == "request"))
+            connection.link_layer.there(lambda: self._arrive(data, confirm=kind == "request"))
 
     def start_notify(self, call: Message) -> None:
         """GattCharacteristic1.StartNotify."""
@@ -294,7 +294,7 @@ class BleModule:
         if self._connection and self._connection.line:
             self._connection.line.send(data)
             if confirm:
-                self._connection.air.back(partial(self._answer, WRITE))
+                self._connection.link_layer.back(partial(self._answer, WRITE))
 
     def _notify(self, chunk: bytes) -> None:
         self.watch("notify")

@@ -156,10 +156,10 @@ async def serve(
     **radio: Any,
 ) -> str:
     """Gives a simulation a BLE module until the stack is closed; returns its URL."""
-    air = RadioSettings(**radio)
+    settings = RadioSettings(**radio)
     shared = rigs.setdefault(asyncio.get_running_loop(), Shared())
     world = await stack.enter_async_context(shared.use())
-    module = world.add(simulation, air, name=name, address=address)
+    module = world.add(simulation, settings, name=name, address=address)
     stack.callback(world.remove, module)
     simulation.environment.update(world.environment)
     return module.url

@@ -69,26 +69,26 @@ class Device:
         self._clock = clock
         self._inputs: dict[Hashable, float] = {}
         self._garbage_reads = 0
-        self._course = Timeline(
+        self._timeline = Timeline(
             self.options, clock(), tuple(joints), lambda work: work.begin(self), finished=self._finished
         )
-        self._queue = self._course.queue
+        self._queue = self._timeline.queue
 
     def advance(self) -> None:
         """Brings everything up to the clock."""
         if self.scene is None:
-            self._course.run(self._clock())
-        elif not self._course.busy:
+            self._timeline.run(self._clock())
+        elif not self._timeline.busy:
             self.scene.advance(self._clock())
 
     def run(self, until: float) -> None:
         """Brings this device alone up to a time; for what it stands in."""
-        self._course.run(until)
+        self._timeline.run(until)
 
     @property
     def due(self) -> float:
         """When the next thing happens by itself; infinity if nothing does."""
-        return self._course.due
+        return self._timeline.due
 
     # What can be read of it.
 
@@ -96,42 +96,42 @@ class Device:
     def now(self) -> float:
         """Simulated seconds; inside of `begin`, `end` and `on_finish` the exact time of the event."""
         self.advance()
-        return self._course.time
+        return self._timeline.time
 
     @property
     def uptime(self) -> float:
         """Simulated seconds since power-up."""
-        return self.now - self._course.powered
+        return self.now - self._timeline.powered
 
     @property
     def joints(self) -> Vector:
         """Where the joints are."""
         self.advance()
-        return self._course.joints
+        return self._timeline.joints
 
     @property
     def joint_speeds(self) -> Vector:
         """How fast the joints turn, degrees/s."""
         self.advance()
-        return self._course.joint_speeds
+        return self._timeline.joint_speeds
 
     @property
     def moving(self) -> bool:
         """Whether a motion goes on, in the queue or beside it."""
         self.advance()
-        return any(active.work.moves for active in self._course.active)
+        return any(active.work.moves for active in self._timeline.active)
 
     @property
     def executing(self) -> Work | None:
         """The work that the queue is at, if any."""
         self.advance()
-        return self._course.running.work if self._course.running else None
+        return self._timeline.running.work if self._timeline.running else None
 
     @property
     def beside(self) -> Work | None:
         """The work that goes on beside the queue, such as a jog, if any."""
         self.advance()
-        return self._course.aside.work if self._course.aside else None
+        return self._timeline.aside.work if self._timeline.aside else None
 
     @property
     def following(self) -> Work | None:
@@ -143,19 +143,19 @@ class Device:
     def idle(self) -> bool:
         """Whether nothing executes and nothing waits."""
         self.advance()
-        return not self._course.active and not self._queue
+        return not self._timeline.active and not self._queue
 
     @property
     def started(self) -> bool:
         """Whether the queue may begin its next command (the run flag)."""
         self.advance()
-        return self._course.started
+        return self._timeline.started
 
     @property
     def left_space(self) -> int:
         """How many commands the queue can take now."""
         self.advance()
-        return self._course.left
+        return self._timeline.left
 
     @property
     def current_index(self) -> int:
@@ -165,83 +165,83 @@ class Device:
             return NO_INDEX - self._garbage_reads % 2
 
         self.advance()
-        return self._course.last_index
+        return self._timeline.last_index
 
     @property
     def next_index(self) -> int:
         """Index that the next command will get."""
-        return self._course.next_index
+        return self._timeline.next_index
 
     @property
     def alarms(self) -> frozenset[int]:
         """Codes of the alarms that are set."""
         self.advance()
-        return frozenset(self._course.alarms)
+        return frozenset(self._timeline.alarms)
 
     @property
     def halted(self) -> bool:
         """Whether alarms hold motions back."""
         self.advance()
-        return self._course.halted
+        return self._timeline.halted
 
     @property
     def executed(self) -> list[Executed]:
         """What has finished so far, in the order of finishing."""
         self.advance()
-        return list(self._course.executed)
+        return list(self._timeline.executed)
 
     # The queue.
 
     def put(self, work: Work) -> int | None:
         """Queues a work; returns its index, or None if the queue is full."""
         self.advance()
-        if self._course.left <= 0:
+        if self._timeline.left <= 0:
             return None
 
         index = self.skip()
         self.accepted += 1
         self._queue.append((index, work))
-        self._course.settle()
+        self._timeline.settle()
         return index
 
     def skip(self) -> int:
         """Returns the next index for a command that is not executed, such as one that is only stored."""
-        self._course.next_index += 1
-        return self._course.next_index - 1
+        self._timeline.next_index += 1
+        return self._timeline.next_index - 1
 
     def start(self) -> None:
         """Lets the queue run."""
         self.advance()
-        self._course.started = True
-        self._course.settle()
+        self._timeline.started = True
+        self._timeline.settle()
 
     def stop(self) -> None:
         """Lets the command that executes end, and no other begin."""
         self.advance()
-        self._course.started = False
+        self._timeline.started = False
 
     def force_stop(self) -> None:
         """Ends all that goes on, now, where the arm is; the queue keeps the rest and waits for `start`."""
         self.advance()
-        self._course.started = False
-        self._course.interrupt("aborted")
+        self._timeline.started = False
+        self._timeline.interrupt("aborted")
 
     def clear(self) -> None:
         """Empties the queue; the command that executes ends now."""
         self.advance()
         self._queue.clear()
-        self._course.interrupt("aborted", aside=False)
-        self._course.settle()
+        self._timeline.interrupt("aborted", aside=False)
+        self._timeline.settle()
 
     # What goes on beside the queue.
 
     def perform(self, work: Work) -> None:
         """Does now, whatever else goes on, what takes no time and does not move the arm."""
         self.advance()
-        if self._course.begin(work):
-            self._course.record(work, None, self._course.time, "done")
+        if self._timeline.begin(work):
+            self._timeline.record(work, None, self._timeline.time, "done")
 
-        self._course.settle()
+        self._timeline.settle()
 
     def begin_aside(self, work: Work) -> bool:
         """Begins a jog or an immediate motion; returns False, and does nothing, if something executes or is frozen.
@@ -249,52 +249,52 @@ class Device:
         While it moves the arm, the queue's motions wait. Alarms do not hold it back, for a jog leads out of a limit.
         """
         self.advance()
-        if self._course.active or self._course.frozen_at is not None:
+        if self._timeline.active or self._timeline.frozen_at is not None:
             return False
 
-        self._course.aside = self._course.begin(work)
-        self._course.settle()
+        self._timeline.aside = self._timeline.begin(work)
+        self._timeline.settle()
         return True
 
     def replace(self, work: Work) -> bool:
         """Begins an immediate motion in place of the one that goes on; False, without effect, beside anything else."""
         self.advance()
-        begun = self._course.replace(work)
-        self._course.settle()
+        begun = self._timeline.replace(work)
+        self._timeline.settle()
         return begun
 
     def end_aside(self) -> None:
         """Ends a jog where the arm is, as a key that is let go does."""
         self.advance()
-        self._course.interrupt("done", queued=False)
-        self._course.settle()
+        self._timeline.interrupt("done", queued=False)
+        self._timeline.settle()
 
     def freeze(self) -> None:
         """Halts in the middle of whatever goes on; its time stands still until `thaw`."""
         self.advance()
-        if self._course.frozen_at is None:
-            self._course.frozen_at = self._course.time
+        if self._timeline.frozen_at is None:
+            self._timeline.frozen_at = self._timeline.time
 
     def thaw(self) -> None:
         """Goes on from where `freeze` halted."""
         self.advance()
-        self._course.thaw()
+        self._timeline.thaw()
 
     # Alarms, inputs, power.
 
     def raise_alarm(self, code: int) -> None:
         """Sets an alarm, as when the arm hits something; a fault ends the motion that goes on."""
         self.advance()
-        self._course.alarms.add(code)
+        self._timeline.alarms.add(code)
         if code not in self.options.harmless:
-            self._course.interrupt("alarm", moving_only=True)
-        self._course.settle()
+            self._timeline.interrupt("alarm", moving_only=True)
+        self._timeline.settle()
 
     def clear_alarms(self, codes: Iterable[int] | None = None) -> None:
         """Clears these alarms, or all; motions that they held back begin."""
         self.advance()
-        self._course.alarms -= set(self._course.alarms if codes is None else codes)
-        self._course.settle()
+        self._timeline.alarms -= set(self._timeline.alarms if codes is None else codes)
+        self._timeline.settle()
 
     def get_input(self, key: Hashable, default: float = 0.0) -> float:
         """What an input reads."""
@@ -304,19 +304,19 @@ class Device:
         """Changes what an input reads, as the world outside does; a condition that now holds ends at this moment."""
         self.advance()
         self._inputs[key] = value
-        self._course.settle()
+        self._timeline.settle()
 
     def place(self, joints: Vector) -> None:
         """Puts the joints elsewhere at once, as a hand or a reset of the pose does; for an arm that does not move."""
         self.advance()
-        self._course.place(tuple(joints))
+        self._timeline.place(tuple(joints))
 
     def power_cycle(self) -> None:
         """Switches off and on: aborts what goes on, and all but the joints and the inputs is as after power-up."""
         self.advance()
-        self._course.started = False
-        self._course.interrupt("aborted")
-        self._course.boot()
+        self._timeline.started = False
+        self._timeline.interrupt("aborted")
+        self._timeline.boot()
 
     def _finished(self, executed: Executed) -> None:
         if self.on_finish:

@@ -1,12 +1,12 @@
-"""Legs: ways with their speed, in joints. Knows no family and no clock.
+"""Segments: ways with their speed, in joints. Knows no family and no clock.
 
     joints ---joint_leg--> Leg --.
     Curve ----curve_leg--> Leg --+--travel--> Activity
-    jump(...) -----------> Legs -'
+    jump(...) -----------> Segments -'
 
 A joint vector has any length; kinematics come as a `JointSolver`. The end of a curve has to be within reach, or
-planning raises the solver's fault. On the way the reach is looked at every few mm and degrees, and a leg that leaves it
-ends at that place, with the fault of the way (Dobot's codes: that of the plan and 0x10).
+planning raises the solver's fault. The reach is checked every few mm and degrees, and a segment that
+leaves it ends at that place, with the fault of the way (Dobot's codes: that of the plan and 0x10).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dobot_async.simulator.device.curve import SAME_PLACE, Curve, LineSegment, b
 from dobot_async.simulator.device.profile import Profile, SpeedLimits, shared
 from dobot_async.simulator.device.work import Activity, DeviceFault, Vector
 
-__all__ = ["JointSolver", "Leg", "curve_leg", "joint_leg", "jump", "travel"]
+__all__ = ["JointSolver", "Segment", "curve_segment", "joint_segment", "jump", "travel"]
 
 REPEATED_POINTS, BAD_JUMP = 0x13, 0x15
 UNDERWAY = 0x10
@@ -44,7 +44,7 @@ class JointSolver(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Leg:
+class Segment:
     """A way and its speed.
 
     Attributes:
@@ -133,9 +133,9 @@ class Solved:
         return found if isinstance(found, DeviceFault) else None
 
 
-def joint_leg(
+def joint_segment(
     start: Vector, end: Vector, pace: SpeedLimits, *, fault: DeviceFault | None = None, leave: float = 0.0
-) -> Leg:
+) -> Segment:
     """Returns the way on which all joints set out and arrive together, the slowest at its pace.
 
     Args:
@@ -146,10 +146,10 @@ def joint_leg(
         leave: Share of the way per second at its end; `math.inf` arrives at full speed.
     """
     spans = tuple(b - a for a, b in zip(start, end, strict=True))
-    return Leg(lambda share: between(start, end, share), shared(spans, pace, leave=leave), fault=fault)
+    return Segment(lambda share: between(start, end, share), shared(spans, pace, leave=leave), fault=fault)
 
 
-def curve_leg(
+def curve_segment(
     curve: Curve,
     start: Vector,
     solver: JointSolver,
@@ -160,7 +160,7 @@ def curve_leg(
     underway: int = UNDERWAY,
     enter: float = 0.0,
     leave: float = 0.0,
-) -> Leg:
+) -> Segment:
     """Returns the way along a curve, cut off where it leaves the reach.
 
     Args:
@@ -187,9 +187,9 @@ def curve_leg(
     profile = shared((length, turn), pace, enter=enter * scale, leave=leave * scale)
     left = solved.leaves_reach(known_end=must_arrive)
     if left is None:
-        return Leg(solved, profile)
+        return Segment(solved, profile)
 
-    return Leg(solved, profile, left[0], DeviceFault(left[1].code + underway))
+    return Segment(solved, profile, left[0], DeviceFault(left[1].code + underway))
 
 
 def jump(
@@ -204,8 +204,8 @@ def jump(
     straight: bool = False,
     every: float = EVERY,
     underway: int = UNDERWAY,
-) -> list[Leg]:
-    """Returns the legs up, across and down, or those up to the one that leaves the reach.
+) -> list[Segment]:
+    """Returns the segments up, across and down, or those up to the one that leaves the reach.
 
     The way across is `height` above the higher end, but not above `ceiling` (zLimit).
 
@@ -218,8 +218,8 @@ def jump(
         vertical: Pace up and down, in mm and degrees.
         across: Pace of the joints; with `straight`, of mm and degrees.
         straight: Whether the way across is a straight line (JUMP_MOVL).
-        every: As for `curve_leg`.
-        underway: As for `curve_leg`.
+        every: As for `curve_segment`.
+        underway: As for `curve_segment`.
 
     Raises:
         Fault: The solver's, if the target is out of reach; 0x15 if start or target is above the ceiling; 0x13 if a
@@ -237,51 +237,51 @@ def jump(
     above_origin = (*origin[:2], top, *origin[3:])
     above_target = (*target[:2], top, *target[3:])
 
-    def line(a: Vector, b: Vector, joints: Vector, pace: SpeedLimits) -> Leg:
-        return curve_leg(LineSegment(a, b), joints, solver, pace, must_arrive=False, every=every, underway=underway)
+    def line(a: Vector, b: Vector, joints: Vector, pace: SpeedLimits) -> Segment:
+        return curve_segment(LineSegment(a, b), joints, solver, pace, must_arrive=False, every=every, underway=underway)
 
-    def sideways(joints: Vector) -> Leg:
+    def sideways(joints: Vector) -> Segment:
         if straight:
             return line(above_origin, above_target, joints, across)
 
         try:
-            return joint_leg(joints, solver.inverse(above_target), across)
+            return joint_segment(joints, solver.inverse(above_target), across)
         except DeviceFault as fault:
-            return joint_leg(joints, joints, across, fault=DeviceFault(fault.code + underway))
+            return joint_segment(joints, joints, across, fault=DeviceFault(fault.code + underway))
 
-    legs = [line(origin, above_origin, start, vertical)]
+    segments = [line(origin, above_origin, start, vertical)]
 
-    def down(joints: Vector) -> Leg:
+    def down(joints: Vector) -> Segment:
         return line(above_target, target, joints, vertical)
 
     for following in (sideways, down):
-        if legs[-1].fault:
+        if segments[-1].fault:
             break
 
-        legs.append(following(legs[-1].end))
+        segments.append(following(segments[-1].end))
 
-    return legs
+    return segments
 
 
-def travel(legs: Sequence[Leg], end: Callable[[], None] = lambda: None) -> Activity:
-    """Returns the activity of going along some legs, one after the other.
+def travel(segments: Sequence[Segment], end: Callable[[], None] = lambda: None) -> Activity:
+    """Returns the activity of going along some segments, one after the other.
 
     Args:
-        legs: At least one; a fault may only be in the last.
+        segments: At least one; a fault may only be in the last.
         end: Called when all is done without a fault.
     """
-    ends = list(accumulate(leg.duration for leg in legs))
+    ends = list(accumulate(segment.duration for segment in segments))
 
     def at(elapsed: float) -> Vector:
         number = bisect_right(ends, elapsed)
-        if number == len(legs):
-            return legs[-1].end
+        if number == len(segments):
+            return segments[-1].end
 
-        return legs[number].at(elapsed - (ends[number - 1] if number else 0.0))
+        return segments[number].at(elapsed - (ends[number - 1] if number else 0.0))
 
     def finish() -> None:
-        if legs[-1].fault:
-            raise DeviceFault(legs[-1].fault.code)
+        if segments[-1].fault:
+            raise DeviceFault(segments[-1].fault.code)
 
         end()
 

@@ -57,7 +57,7 @@ class MagicianBody:
         self.color = c.Color(0, 0, 0)
         self.color_version = self.infrared_version = c.AccessoryVersion.V1
         self.infrared = dict.fromkeys(c.InfraredPort, False)
-        self._works = CommandEffects(self.state)
+        self._effects = CommandEffects(self.state)
         self._downloading = False
         self._taught = False
         self._lines: Iterator[Work] = iter(())
@@ -208,7 +208,7 @@ class MagicianBody:
         if program is None or not program.commands:
             return
 
-        works = [self._works.make(row, value) for row, value in program.commands]
+        works = [self._effects.make(row, value) for row, value in program.commands]
         self._lines = (work for _ in range(program.loops) for work in works)
         self.device.start()
         self._go_on_with_program()
@@ -228,7 +228,7 @@ class MagicianBody:
     def put(self, row: Command[Any, Any], value: Any) -> int | None:
         """Queues a command, or stores it during a download; returns its index, or None where there is no room."""
         if not self._downloading or self.program is None:
-            return self.device.put(self._works.make(row, value))
+            return self.device.put(self._effects.make(row, value))
 
         if len(self.program.commands) >= PROGRAM_LINES:
             return None
@@ -243,15 +243,15 @@ class MagicianBody:
         a wait.
         """
         if row is c.SET_JOG_CMD:
-            self._works.jog(value, self.device)
+            self._effects.jog(value, self.device)
         elif row.queueing is Queueing.NEVER:
             self.state.set(row, value)
         elif row.queueing is Queueing.ALLOWED:
-            self.device.perform(self._works.make(row, value))
+            self.device.perform(self._effects.make(row, value))
         elif not row.moves:
-            self.device.begin_aside(self._works.make(row, value))
+            self.device.begin_aside(self._effects.make(row, value))
         elif not self.device.halted:
-            self.device.replace(self._works.make(row, value))
+            self.device.replace(self._effects.make(row, value))
 
     def clear(self) -> None:
         """Empties the queue, and ends a program that runs."""
@@ -280,7 +280,7 @@ class MagicianBody:
     def ptp_time(self, value: c.PTPCmd) -> int:
         """Returns how many ms a motion from here would take; 0 if the arm cannot go there."""
         try:
-            seconds = sum(leg.duration for leg in self._works.motions.ptp_legs(value, self.device.joints))
+            seconds = sum(segment.duration for segment in self._effects.motions.ptp_legs(value, self.device.joints))
         except DeviceFault:
             return 0
 
@@ -295,7 +295,7 @@ class MagicianBody:
         return c.Kinematics(limits.xyz_velocity, limits.xyz_acceleration)
 
     def _finished(self, executed: Executed) -> None:
-        self._works.finished(executed, self.device)
+        self._effects.finished(executed, self.device)
         self._go_on_with_program()
 
     def _go_on_with_program(self) -> None:

@@ -13,7 +13,7 @@ from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.kinematics import JointLimits
 from dobot_async.simulator.device.curve import LineSegment
 from dobot_async.simulator.device.device import Activity, DeviceFault, Vector
-from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg
+from dobot_async.simulator.device.path import Segment, curve_segment, joint_segment
 from dobot_async.simulator.device.profile import SpeedLimits, trapezoid
 from dobot_async.simulator.magician.motion import RAIL, along, clipped, standing
 from dobot_async.simulator.magician.reach import Reach
@@ -40,11 +40,11 @@ def jog(state: State, reach: Reach, value: c.JOGCmd, joints: Vector) -> Activity
         return rail_jog(state, direction, factors, joints) if value.is_joint else Activity()
 
     if value.is_joint:
-        leg = joint_jog(state, axis, direction, factors, joints[:4])
+        segment = joint_jog(state, axis, direction, factors, joints[:4])
     else:
-        leg = tool_jog(state, reach, axis, direction, factors, joints[:4])
+        segment = tool_jog(state, reach, axis, direction, factors, joints[:4])
 
-    return along([leg], standing(joints[4]))
+    return along([segment], standing(joints[4]))
 
 
 def margins(limits: JointLimits, joints: Vector) -> dict[int, float]:
@@ -59,7 +59,7 @@ def margins(limits: JointLimits, joints: Vector) -> dict[int, float]:
     return left
 
 
-def joint_jog(state: State, axis: int, direction: int, factors: tuple[float, float], joints: Vector) -> Leg:
+def joint_jog(state: State, axis: int, direction: int, factors: tuple[float, float], joints: Vector) -> Segment:
     """One joint to its limit."""
     left = margins(state.limits, joints)
     codes = {
@@ -70,12 +70,12 @@ def joint_jog(state: State, axis: int, direction: int, factors: tuple[float, flo
     target = (*joints[:axis], joints[axis] + direction * max(0.0, left[code]), *joints[axis + 1 :])
     limits = state.get(c.SET_JOG_JOINT_PARAMS)
     pace = SpeedLimits(limits.velocity, limits.acceleration).scaled(*factors)
-    return joint_leg(joints, target, pace, fault=DeviceFault(code), leave=math.inf)
+    return joint_segment(joints, target, pace, fault=DeviceFault(code), leave=math.inf)
 
 
 def tool_jog(
     state: State, reach: Reach, axis: int, direction: int, factors: tuple[float, float], joints: Vector
-) -> Leg:
+) -> Segment:
     """The tool along x, y or z, or turning, until a joint is at its limit."""
     start = reach.forward(joints)
     end = (*start[:axis], start[axis] + direction * FAR, *start[axis + 1 :])
@@ -83,12 +83,12 @@ def tool_jog(
     pace = SpeedLimits(
         (limits.velocity[axis], limits.velocity[3]), (limits.acceleration[axis], limits.acceleration[3])
     ).scaled(*factors)
-    leg = curve_leg(LineSegment(start, end), joints, reach, pace, must_arrive=False)
-    if leg.fault and leg.fault.code == LIMIT_UNDERWAY:
-        left = margins(state.limits, leg.end)
-        return replace(leg, fault=DeviceFault(min(left, key=left.__getitem__)))
+    segment = curve_segment(LineSegment(start, end), joints, reach, pace, must_arrive=False)
+    if segment.fault and segment.fault.code == LIMIT_UNDERWAY:
+        left = margins(state.limits, segment.end)
+        return replace(segment, fault=DeviceFault(min(left, key=left.__getitem__)))
 
-    return leg
+    return segment
 
 
 def rail_jog(state: State, direction: int, factors: tuple[float, float], joints: Vector) -> Activity:
@@ -98,5 +98,5 @@ def rail_jog(state: State, direction: int, factors: tuple[float, float], joints:
 
     limits = state.get(c.SET_JOGL_PARAMS)
     pace = SpeedLimits((limits.velocity,), (limits.acceleration,)).scaled(*factors)
-    rail = joint_leg((joints[4],), (RAIL[direction > 0],), pace, leave=math.inf)
-    return along([Leg(lambda _: joints[:4], trapezoid(0.0, 0.0, 0.0))], rail)
+    rail = joint_segment((joints[4],), (RAIL[direction > 0],), pace, leave=math.inf)
+    return along([Segment(lambda _: joints[:4], trapezoid(0.0, 0.0, 0.0))], rail)

@@ -13,7 +13,7 @@ from functools import partial
 from dobot_async.arms.magician import commands as c
 from dobot_async.simulator.device.curve import LineSegment, arc, between, circle
 from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Vector
-from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg, jump, travel
+from dobot_async.simulator.device.path import Segment, curve_segment, joint_segment, jump, travel
 from dobot_async.simulator.device.profile import SpeedLimits, trapezoid
 from dobot_async.simulator.magician.reach import Reach
 from dobot_async.simulator.magician.state import HOME_JOINTS, HOME_POINT, State
@@ -47,7 +47,7 @@ class Motions:
     def ptp(self, value: AnyPTP, device: Device) -> Activity:
         """A point-to-point motion, with the rail's and with outputs on the way if it has any."""
         joints = device.joints
-        legs = self.ptp_legs(value, joints)
+        segments = self.ptp_legs(value, joints)
         rail = standing(joints[4])
         if isinstance(value, (c.PTPWithLCmd, c.PTPPOWithLCmd)) and self._state.has_rail:
             rail = self._rail_leg(joints[4], value.rail)
@@ -55,14 +55,14 @@ class Motions:
         outputs = value.outputs if isinstance(value, (c.PTPPOCmd, c.PTPPOWithLCmd)) else ()
         switches = [
             (
-                self._time_at(legs, output.ratio),
+                self._time_at(segments, output.ratio),
                 partial(self._state.set, c.SET_IODO, c.IODO(output.address, output.level)),
             )
             for output in outputs
         ]
-        return along(legs, rail, on_the_way=switches)
+        return along(segments, rail, on_the_way=switches)
 
-    def ptp_legs(self, value: AnyPTP, joints: Vector) -> list[Leg]:
+    def ptp_legs(self, value: AnyPTP, joints: Vector) -> list[Segment]:
         """The arm's own way of a point-to-point motion."""
         meaning, way = PTP_MODES[value.ptp_mode]
         start, reach = joints[:4], self.reach
@@ -84,7 +84,7 @@ class Motions:
         limits, ratios = self._state.get(c.SET_CP_PARAMS), self._state.get(c.SET_CP_COMMON_PARAMS)
         velocity, acceleration = limits.junction_vel * clipped(ratios.velocity_ratio), limits.plan_acc
         passed_at, passed_with = self._passing
-        leg = curve_leg(
+        segment = curve_segment(
             LineSegment(start, (*place, turn)),
             joints[:4],
             reach,
@@ -93,23 +93,25 @@ class Motions:
             leave=velocity if goes_on(device) else 0.0,
         )
         length = math.dist(start[:3], place)
-        return along([leg], standing(joints[4]), end=lambda: self._pass(device.now, leg.profile.leave * length))
+        return along([segment], standing(joints[4]), end=lambda: self._pass(device.now, segment.profile.leave * length))
 
     def arc(self, value: c.ARCCmd, device: Device) -> Activity:
         """An arc from where the arm is."""
         joints, reach = device.joints, self.reach
         curve = arc(reach.forward(joints[:4]), point_of(value.cir_point), point_of(value.to_point))
-        return along([curve_leg(curve, joints[:4], reach, self._arc_pace)], standing(joints[4]))
+        return along([curve_segment(curve, joints[:4], reach, self._arc_pace)], standing(joints[4]))
 
     def circle(self, value: c.CircleCmd, device: Device) -> Activity:
         """Whole circles from where the arm is. They are all the same, so the reach is looked at on the first."""
         joints, reach = device.joints, self.reach
         points = reach.forward(joints[:4]), point_of(value.cir_point), point_of(value.to_point)
-        leg = curve_leg(circle(*points, count=1), joints[:4], reach, self._arc_pace)
-        if not leg.fault:
-            leg = curve_leg(circle(*points, count=value.count), joints[:4], reach, self._arc_pace, every=math.inf)
+        segment = curve_segment(circle(*points, count=1), joints[:4], reach, self._arc_pace)
+        if not segment.fault:
+            segment = curve_segment(
+                circle(*points, count=value.count), joints[:4], reach, self._arc_pace, every=math.inf
+            )
 
-        return along([leg], standing(joints[4]))
+        return along([segment], standing(joints[4]))
 
     def home(self, device: Device) -> Activity:
         """Homing: the steps that were lost are found again, of the rail as well if there is one.
@@ -127,21 +129,21 @@ class Motions:
             device.place((*target, there[4] - state.astray[4]))
             device.clear_alarms(LOSE_STEP)
 
-        arm = Leg(lambda share: between(joints[:4], believed[:4], share), HOMING)
-        return along([arm], Leg(lambda share: between(joints[4:], believed[4:], share), HOMING), end=end)
+        arm = Segment(lambda share: between(joints[:4], believed[:4], share), HOMING)
+        return along([arm], Segment(lambda share: between(joints[4:], believed[4:], share), HOMING), end=end)
 
     # The three ways of a point-to-point motion.
 
-    def by_joints(self, _: Reach, start: Vector, target: Vector) -> list[Leg]:
+    def by_joints(self, _: Reach, start: Vector, target: Vector) -> list[Segment]:
         """All joints together."""
-        return [joint_leg(start, target, self._joint_pace)]
+        return [joint_segment(start, target, self._joint_pace)]
 
-    def by_line(self, reach: Reach, start: Vector, target: Vector) -> list[Leg]:
+    def by_line(self, reach: Reach, start: Vector, target: Vector) -> list[Segment]:
         """The tool on a straight line."""
         line = LineSegment(reach.forward(start), reach.forward(target))
-        return [curve_leg(line, start, reach, self._tool_pace)]
+        return [curve_segment(line, start, reach, self._tool_pace)]
 
-    def by_jump(self, reach: Reach, start: Vector, target: Vector, *, straight: bool = False) -> list[Leg]:
+    def by_jump(self, reach: Reach, start: Vector, target: Vector, *, straight: bool = False) -> list[Segment]:
         """Up, across and down."""
         point = reach.forward(target)
         lift_start, lift_end, ceiling = self._state.lift
@@ -170,26 +172,28 @@ class Motions:
     def _arc_pace(self) -> SpeedLimits:
         return tool_pace(self._state.get(c.SET_ARC_PARAMS), self._state.get(c.SET_ARC_COMMON_PARAMS))
 
-    def _rail_leg(self, start: float, end: float) -> Leg:
+    def _rail_leg(self, start: float, end: float) -> Segment:
         """The rail's way; raises Fault if it is not that long."""
         if not RAIL[0] <= end <= RAIL[1]:
             raise DeviceFault(BEYOND_LIMIT)
 
         limits, ratios = self._state.get(c.SET_PTPL_PARAMS), self._state.get(c.SET_PTP_COMMON_PARAMS)
-        return joint_leg((start,), (end,), paced(SpeedLimits((limits.velocity,), (limits.acceleration,)), ratios))
+        return joint_segment((start,), (end,), paced(SpeedLimits((limits.velocity,), (limits.acceleration,)), ratios))
 
-    def _time_at(self, legs: Sequence[Leg], percent: float) -> float:
+    def _time_at(self, segments: Sequence[Segment], percent: float) -> float:
         """After how many seconds the tool has gone so much of its way."""
         forward = self.reach.forward
-        lengths = [math.dist(forward(leg.joints(0.0))[:3], forward(leg.joints(1.0))[:3]) for leg in legs]
+        lengths = [
+            math.dist(forward(segment.joints(0.0))[:3], forward(segment.joints(1.0))[:3]) for segment in segments
+        ]
         left = sum(lengths) * clipped(percent)
         before = 0.0
-        for leg, length in zip(legs, lengths, strict=True):
+        for segment, length in zip(segments, lengths, strict=True):
             if left <= length and length > 0:
-                return before + leg.profile.time(left / length)
+                return before + segment.profile.time(left / length)
 
             left -= length
-            before += leg.duration
+            before += segment.duration
 
         return before * clipped(percent) if not sum(lengths) else before
 
@@ -198,16 +202,16 @@ class Motions:
 
 
 def along(
-    legs: Sequence[Leg],
-    rail: Leg,
+    segments: Sequence[Segment],
+    rail: Segment,
     *,
     on_the_way: Sequence[tuple[float, Callable[[], None]]] = (),
     end: Callable[[], None] = lambda: None,
 ) -> Activity:
     """The arm and the rail side by side; where the arm's way ends by a fault, so does the rail's."""
-    arm = travel(legs, end)
-    duration = sum(leg.duration for leg in legs)
-    if not legs[-1].fault:
+    arm = travel(segments, end)
+    duration = sum(segment.duration for segment in segments)
+    if not segments[-1].fault:
         duration = max(duration, rail.duration)
 
     def at(elapsed: float) -> Vector:
@@ -219,9 +223,9 @@ def along(
     return Activity(duration, at, arm.end, reached)
 
 
-def standing(place: float) -> Leg:
+def standing(place: float) -> Segment:
     """A rail that stays where it is."""
-    return Leg(lambda _: (place,), STANDSTILL)
+    return Segment(lambda _: (place,), STANDSTILL)
 
 
 def clipped(percent: float) -> float:
@@ -283,7 +287,7 @@ def more_point(reach: Reach, start: Vector, numbers: Vector) -> Vector:
 
 PTP_MODES: Mapping[
     c.PTPMode,
-    tuple[Callable[[Reach, Vector, Vector], Vector], Callable[[Motions, Reach, Vector, Vector], list[Leg]]],
+    tuple[Callable[[Reach, Vector, Vector], Vector], Callable[[Motions, Reach, Vector, Vector], list[Segment]]],
 ] = {
     c.PTPMode.JUMP_XYZ: (point, Motions.by_jump),
     c.PTPMode.MOVJ_XYZ: (point, Motions.by_joints),

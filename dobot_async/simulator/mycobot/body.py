@@ -13,13 +13,13 @@ from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.mycobot import commands as c
 from dobot_async.arms.mycobot.models import SENTINEL, CobotModel
 from dobot_async.simulator.device.device import Device, DeviceFault, DeviceOptions, Executed, Work
-from dobot_async.simulator.device.path import Leg, travel
+from dobot_async.simulator.device.path import Segment, travel
 from dobot_async.simulator.device.work import Vector
 from dobot_async.simulator.mycobot.elbow import elbow_angle
 from dobot_async.simulator.mycobot.gripper import SimulatedGripper
 from dobot_async.simulator.mycobot.kinematics import Chain, Palletizer, Transform
 from dobot_async.simulator.mycobot.plans import CENTRE, PLANS, STEPS
-from dobot_async.simulator.mycobot.segments import Ways
+from dobot_async.simulator.mycobot.segments import SegmentPlanner
 
 __all__ = ["MYCOBOT", "MyCobotBody"]
 
@@ -60,7 +60,7 @@ class MyCobotBody:
     ) -> None:
         self.model = model
         self.device = Device(clock, (0.0,) * model.joints, options or MYCOBOT)
-        self.ways: Ways = Ways(model, play)
+        self.ways: SegmentPlanner = SegmentPlanner(model, play)
         self.gripper = SimulatedGripper(lambda: self.device.now, plugged_in=gripper)
         self.powered = True
         self.released: set[int] = set()
@@ -262,7 +262,7 @@ class MyCobotBody:
         self.device.thaw()
         self.device.start()
 
-    def _planned(self, row: Command[Any, Any], value: Any) -> Leg:
+    def _planned(self, row: Command[Any, Any], value: Any) -> Segment:
         """The way of a motion, from where the arm is now."""
         try:
             return PLANS[row](self, value)
@@ -270,7 +270,7 @@ class MyCobotBody:
             self.error = fault.code
             raise
 
-    def _jogged(self, value: Any) -> Leg:
+    def _jogged(self, value: Any) -> Segment:
         start, up = self.joints, value.direction is c.Direction.UP
         if isinstance(value, c.JogJoint):
             return self.ways.jog_joint(start, value.joint - 1, up=up, speed=value.speed)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.mycobot import commands as c
-from dobot_async.simulator.device.path import Leg
+from dobot_async.simulator.device.path import Segment
 from dobot_async.simulator.device.profile import SpeedLimits
 from dobot_async.simulator.mycobot.kinematics import Palletizer, Transform
 
@@ -19,7 +19,7 @@ __all__ = ["CENTRE", "PLANS", "STEPS"]
 CENTRE, STEPS = 2048, 4096 / 360
 
 
-def to_joints(arm: MyCobotBody, joints: Mapping[int, float], speed: float) -> Leg:
+def to_joints(arm: MyCobotBody, joints: Mapping[int, float], speed: float) -> Segment:
     """Some joints, by their places, to angles."""
     target = list(arm.joints)
     for place, angle in joints.items():
@@ -28,7 +28,7 @@ def to_joints(arm: MyCobotBody, joints: Mapping[int, float], speed: float) -> Le
     return arm.ways.to_joints(arm.joints, target, speed)
 
 
-def to_point(arm: MyCobotBody, coords: Mapping[int, float], speed: float, mode: c.MoveMode | None) -> Leg:
+def to_point(arm: MyCobotBody, coords: Mapping[int, float], speed: float, mode: c.MoveMode | None) -> Segment:
     """Some coordinates, by their places, to values."""
     target: Sequence[float] = [coords.get(place, here) for place, here in enumerate(arm.coords)]
     if not isinstance(arm.ways.solver, Palletizer):
@@ -39,7 +39,7 @@ def to_point(arm: MyCobotBody, coords: Mapping[int, float], speed: float, mode: 
     return arm.ways.to_point(arm.joints, target, speed, straight=straight)
 
 
-def drag(arm: MyCobotBody, value: c.SetEncodersDrag) -> Leg:
+def drag(arm: MyCobotBody, value: c.SetEncodersDrag) -> Segment:
     """All servos to positions, each no faster than its own speed in steps/s; 0 is as fast as it can."""
     fastest = arm.ways.pace(100)
     speeds = tuple(
@@ -54,12 +54,12 @@ def of_encoders(encoders: Sequence[int]) -> dict[int, float]:
     return {place: (encoder - CENTRE) / STEPS for place, encoder in enumerate(encoders)}
 
 
-def one_encoder(arm: MyCobotBody, value: c.SetEncoder) -> Leg:
+def one_encoder(arm: MyCobotBody, value: c.SetEncoder) -> Segment:
     """The servo of one joint."""
     return to_joints(arm, {value.joint - 1: (value.encoder - CENTRE) / STEPS}, value.speed)
 
 
-PLANS: Mapping[Command[Any, Any], Callable[[MyCobotBody, Any], Leg]] = {
+PLANS: Mapping[Command[Any, Any], Callable[[MyCobotBody, Any], Segment]] = {
     c.SEND_ANGLES: lambda arm, value: to_joints(arm, dict(enumerate(value.angles)), value.speed),
     c.SEND_ANGLE: lambda arm, value: to_joints(arm, {value.joint - 1: value.angle}, value.speed),
     c.JOG_ABSOLUTE: lambda arm, value: to_joints(arm, {value.joint - 1: value.angle}, value.speed),

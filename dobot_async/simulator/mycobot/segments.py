@@ -11,13 +11,13 @@ from collections.abc import Sequence
 
 from dobot_async.arms.mycobot.models import CobotModel
 from dobot_async.simulator.device.curve import between
-from dobot_async.simulator.device.path import Leg, joint_leg
+from dobot_async.simulator.device.path import Segment, joint_segment
 from dobot_async.simulator.device.profile import SpeedLimits, shared
 from dobot_async.simulator.device.work import DeviceFault, Vector
 from dobot_async.simulator.mycobot.elbow import turn_elbow
 from dobot_async.simulator.mycobot.kinematics import KINEMATICS, Chain, Transform
 
-__all__ = ["NO_INVERSE", "NO_LINE", "Ways"]
+__all__ = ["NO_INVERSE", "NO_LINE", "SegmentPlanner"]
 
 NO_INVERSE, NO_LINE = 0x20, 0x21
 EVERY = 5.0  # mm or degrees between two points of a straight way
@@ -29,7 +29,7 @@ LIMIT_SLACK = 1e-6
 SIGNS = (1, 1, -1, -1, 1, -1, 1)  # of the play of each joint
 
 
-class Ways:
+class SegmentPlanner:
     """The ways of one model.
 
     Attributes:
@@ -44,16 +44,18 @@ class Ways:
         self.limits = list(model.joint_limits)
         self.solver = KINEMATICS[model.name]
 
-    def to_joints(self, start: Vector, target: Sequence[float], speed: float, pace: SpeedLimits | None = None) -> Leg:
+    def to_joints(
+        self, start: Vector, target: Sequence[float], speed: float, pace: SpeedLimits | None = None
+    ) -> Segment:
         """All joints set out and arrive together; the slowest at its pace, by default as the percentage says."""
         for joint, (angle, (low, high)) in enumerate(zip(target, self.limits, strict=True), 1):
             if not low - LIMIT_SLACK <= angle <= high + LIMIT_SLACK:
                 raise DeviceFault(joint)
 
         end = tuple(angle + off for angle, off in zip(target, self.play, strict=True))
-        return joint_leg(start, end, pace or self.pace(speed))
+        return joint_segment(start, end, pace or self.pace(speed))
 
-    def to_point(self, start: Vector, point: Sequence[float], speed: float, *, straight: bool) -> Leg:
+    def to_point(self, start: Vector, point: Sequence[float], speed: float, *, straight: bool) -> Segment:
         """The flange to a point, by the joints or along a straight line."""
         found = self.solver.inverse(point, start, self.limits)
         if found is None:
@@ -62,13 +64,13 @@ class Ways:
         if not straight:
             return self.to_joints(start, found, speed)
 
-        leg = self.line(start, point, speed)
-        if leg.stop < 1.0:
+        segment = self.line(start, point, speed)
+        if segment.stop < 1.0:
             raise DeviceFault(NO_LINE)
 
-        return leg
+        return segment
 
-    def elbow(self, start: Vector, angle: float, speed: float) -> Leg:
+    def elbow(self, start: Vector, angle: float, speed: float) -> Segment:
         """The elbow of seven joints to an angle, with the flange where it is at the end."""
         found = turn_elbow(self.solver, start, angle, self.limits) if isinstance(self.solver, Chain) else None
         if found is None:
@@ -76,12 +78,12 @@ class Ways:
 
         return self.to_joints(start, found, speed)
 
-    def jog_joint(self, start: Vector, joint: int, *, up: bool, speed: float) -> Leg:
+    def jog_joint(self, start: Vector, joint: int, *, up: bool, speed: float) -> Segment:
         """One joint (from 0) to its limit."""
         target = (*start[:joint], self.limits[joint][up], *start[joint + 1 :])
-        return joint_leg(start, target, self.pace(speed), leave=math.inf)
+        return joint_segment(start, target, self.pace(speed), leave=math.inf)
 
-    def jog_axis(self, start: Vector, axis: int, *, up: bool, speed: float) -> Leg:
+    def jog_axis(self, start: Vector, axis: int, *, up: bool, speed: float) -> Segment:
         """The flange along or about an axis (from 0) as far as it goes."""
         point = list(self.solver.forward(start))
         if axis < 3:
@@ -91,7 +93,7 @@ class Ways:
         point[axis] += 120.0 if up else -120.0
         return self.line(start, point, speed)
 
-    def line(self, start: Vector, point: Sequence[float], speed: float) -> Leg:
+    def line(self, start: Vector, point: Sequence[float], speed: float) -> Segment:
         """The flange along a straight line, as far as there are joints for it next to one another."""
         begin = self.solver.forward(start)
         end = list(point)
@@ -120,7 +122,7 @@ class Ways:
 
         factor = speed / 100
         pace = SpeedLimits((TOOL_SPEED * factor, self.model.joint_speed * factor), (TOOL_ACCELERATION, ACCELERATION))
-        return Leg(joints, shared((length, turn), pace), (len(ways) - 1) / count)
+        return Segment(joints, shared((length, turn), pace), (len(ways) - 1) / count)
 
     def pace(self, speed: float) -> SpeedLimits:
         """What the joints may do at a percentage."""

@@ -2,7 +2,7 @@
 
 from dobot_async.simulator.scene.geometry import Place3
 from dobot_async.simulator.scene.scene import Scene
-from dobot_async.simulator.scene.seat import Event, SceneArm
+from dobot_async.simulator.scene.scene_arm import Event, SceneArm
 from dobot_async.simulator.scene.stock import Workpiece
 from dobot_async.simulator.scene.things import (
     Belt,

@@ -21,7 +21,7 @@ from typing import Any
 
 from dobot_async.arms.registry import Parts
 from dobot_async.simulator.scene.geometry import Place3, Placement
-from dobot_async.simulator.scene.seat import Event, SceneArm, ScenePlace
+from dobot_async.simulator.scene.scene_arm import Event, SceneArm, ScenePlace
 from dobot_async.simulator.scene.stock import ABOVE_ALL, RunningBelt, Stock, Workpiece
 from dobot_async.simulator.scene.things import SEEN, Belt, Block, ColorSpot, LightBeam, Mount, Piece
 
@@ -69,7 +69,7 @@ class Scene:
 
         self._stock = Stock(table, blocks, belts)
         self._sensors = tuple(sensors)
-        self._seats: list[ScenePlace] = []
+        self._arms: list[ScenePlace] = []
         self._events: deque[Event] = deque(maxlen=EVENTS)
         self._strokes: list[list[Place3]] = []
         self._clock: Callable[[], float] = lambda: self._time
@@ -169,7 +169,7 @@ class Scene:
         Raises:
             ValueError: The arms in it have another speed.
         """
-        if not self._seats:
+        if not self._arms:
             self._clock, self._speed = clock, speed
             self._time = clock()
         elif speed != self._speed:
@@ -188,21 +188,21 @@ class Scene:
             raise ValueError(f"a scene is made for {', '.join(ARMS)}, not for {model!r}")
 
         self.refresh()
-        if mount.name in {seat.mount.name for seat in self._seats}:
+        if mount.name in {scene_arm.mount.name for scene_arm in self._arms}:
             raise ValueError(f"an arm is called {mount.name!r} in the scene already: give each mount a name=")
 
         shown = ARMS[model](arm)
         for belt in self._belts_of(mount):
             shown.pulses(belt.belt.motor)
 
-        seat = ScenePlace(shown, mount, self._stock, self._events.append)
-        self._tell(seat)
+        scene_arm = ScenePlace(shown, mount, self._stock, self._events.append)
+        self._tell(scene_arm)
         for belt in self._belts_of(mount):
             belt.plug(partial(shown.pulses, belt.belt.motor))
 
-        self._seats.append(seat)
+        self._arms.append(scene_arm)
         shown.device.scene = self
-        return lambda: self._detach(seat)
+        return lambda: self._detach(scene_arm)
 
     def advance(self, until: float) -> None:
         """Brings all arms and everything else up to a simulated time; does nothing where an arm itself calls."""
@@ -211,8 +211,8 @@ class Scene:
 
         self._busy = True
         try:
-            for seat in self._seats:
-                seat.stand()
+            for scene_arm in self._arms:
+                scene_arm.stand()
 
             self._go(max(until, self._time))
         finally:
@@ -234,15 +234,15 @@ class Scene:
 
     def _go(self, until: float) -> None:
         while True:
-            if any(seat.changed for seat in self._seats):
+            if any(scene_arm.changed for scene_arm in self._arms):
                 self._look()
 
-            event = min((seat.arm.due for seat in self._seats), default=math.inf)
+            event = min((scene_arm.arm.due for scene_arm in self._arms), default=math.inf)
             step = next_step(self._time) if self._stirs() else math.inf
             self._stirred = self._stirred or step < math.inf
             time = min(until, max(self._time, min(event, step)))
-            for seat in self._seats:
-                seat.arm.device.run(time)
+            for scene_arm in self._arms:
+                scene_arm.arm.device.run(time)
 
             self._time = time
             if time in {event, step}:
@@ -253,37 +253,37 @@ class Scene:
 
     def _stirs(self) -> bool:
         """Whether something moves that concerns the scene, or did at the last look."""
-        if self._stirred or any(seat.arm.moving for seat in self._seats):
+        if self._stirred or any(scene_arm.arm.moving for scene_arm in self._arms):
             return True
 
         return any(
-            seat.arm.turns(belt.belt.motor)
-            for seat in self._seats
-            for belt in self._belts_of(seat.mount)
+            scene_arm.arm.turns(belt.belt.motor)
+            for scene_arm in self._arms
+            for belt in self._belts_of(scene_arm.mount)
             if any(belt in piece.below for piece in self._stock.pieces.values())
         )
 
     def _look(self) -> None:
         """Takes what has happened by now."""
         self._stirred = False
-        for seat in self._seats:
-            seat.look(self._time, self._draw)
+        for scene_arm in self._arms:
+            scene_arm.look(self._time, self._draw)
 
         for piece in self._stock.leave_belts():
             self._events.append(Event(self._time, "off the belt", "", piece.name, piece.placement.place))
 
-        for seat in self._seats:
-            self._tell(seat)
+        for scene_arm in self._arms:
+            self._tell(scene_arm)
 
-    def _tell(self, seat: ScenePlace) -> None:
+    def _tell(self, scene_arm: ScenePlace) -> None:
         """Tells an arm what its sensors see."""
         for sensor in self._sensors:
-            if sensor.arm == seat.mount.name:
+            if sensor.arm == scene_arm.mount.name:
                 seen = self._stock.seen(sensor.at, sensor.to)
                 if isinstance(sensor, LightBeam):
-                    seat.arm.sees(sensor, seen is not None)
+                    scene_arm.arm.sees(sensor, seen is not None)
                 else:
-                    seat.arm.sees_color(sensor, SEEN.get(seen.color, DARK) if seen else DARK)
+                    scene_arm.arm.sees_color(sensor, SEEN.get(seen.color, DARK) if seen else DARK)
 
     def _draw(self, tip: Place3, stroke: list[Place3] | None) -> list[Place3]:
         """Draws on from a stroke, or begins another one."""
@@ -297,23 +297,23 @@ class Scene:
         return stroke
 
     def _take_out_of_hand(self, piece: Workpiece) -> None:
-        for seat in self._seats:
-            if seat.held is piece:
-                seat.held = None
+        for scene_arm in self._arms:
+            if scene_arm.held is piece:
+                scene_arm.held = None
 
     def _belts_of(self, mount: Mount) -> list[RunningBelt]:
         return [belt for belt in self._stock.belts if belt.belt.arm == mount.name]
 
-    def _detach(self, seat: ScenePlace) -> None:
+    def _detach(self, scene_arm: ScenePlace) -> None:
         """Takes an arm out; what it holds stays where it is."""
         with self.still():
-            seat.leave()
-            for belt in self._belts_of(seat.mount):
+            scene_arm.leave()
+            for belt in self._belts_of(scene_arm.mount):
                 belt.plug(None)
 
-        seat.arm.device.scene = None
-        self._seats.remove(seat)
-        if not self._seats:
+        scene_arm.arm.device.scene = None
+        self._arms.remove(scene_arm)
+        if not self._arms:
             self._clock = lambda: self._time
 
 

@@ -104,7 +104,7 @@ class SimulatedUltraArm:
         self.device = Device(clock, (0.0, 0.0, 0.0, 0.0), options or ULTRAARM)
         self.quirks = quirks
         self.counters = UltraArmCounters()
-        self._works = CommandEffects(self._registers)
+        self._effects = CommandEffects(self._registers)
 
     @property
     def registers(self) -> Registers:
@@ -142,7 +142,7 @@ class SimulatedUltraArm:
     def missed(self) -> int:
         """How many motions led nowhere: out of reach, or without power."""
         self.device.advance()
-        return self._works.missed
+        return self._effects.missed
 
     @property
     def queue_size(self) -> int:
@@ -159,7 +159,7 @@ class SimulatedUltraArm:
     def power_cycle(self) -> None:
         """Switches it off and on: it forgets all, and stands where it stood."""
         self.device.power_cycle()
-        self._works.registers = self._registers = Registers(constant_speed=self.quirks.constant_speed)
+        self._effects.registers = self._registers = Registers(constant_speed=self.quirks.constant_speed)
 
     def session(self) -> UltraArmSession:
         """Returns the arm's side of a connection to a new client."""
@@ -214,8 +214,8 @@ class SimulatedUltraArm:
             self.registers.release(self.device.joints)
         elif row in {c.JOG_JOINT, c.JOG_COORD}:
             device.end_aside()
-            return device.begin_aside(self._works.jog(row, value))
-        elif device.put(self._works.make(row, value)) is None:
+            return device.begin_aside(self._effects.jog(row, value))
+        elif device.put(self._effects.make(row, value)) is None:
             self.counters.overflowed += 1
             return False
 

@@ -11,7 +11,7 @@ from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.simulator.device.curve import LineSegment, between
 from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Vector, Work
-from dobot_async.simulator.device.path import Leg, curve_leg, joint_leg, travel
+from dobot_async.simulator.device.path import Segment, curve_segment, joint_segment, travel
 from dobot_async.simulator.device.profile import SpeedLimits, trapezoid
 from dobot_async.simulator.ultraarm.kinematics import REACH, checked, forward, inverse
 
@@ -177,11 +177,11 @@ def move_coords(registers: Registers, joints: Vector, value: c.CoordsMove) -> Ac
 
     own = plus(target, tuple(-each for each in registers.origin))
     pace = SpeedLimits((registers.speed,) * 2, (registers.acceleration,) * 2)
-    leg = curve_leg(LineSegment(forward(joints), own), joints, Geometry(), pace)
-    if leg.fault:
-        raise leg.fault
+    segment = curve_segment(LineSegment(forward(joints), own), joints, Geometry(), pace)
+    if segment.fault:
+        raise segment.fault
 
-    return travel([leg])
+    return travel([segment])
 
 
 def move_joints(registers: Registers, joints: Vector, value: c.JointsMove) -> Activity:
@@ -200,7 +200,7 @@ def move_joint(registers: Registers, joints: Vector, value: c.JointMove) -> Acti
 def turn(registers: Registers, joints: Vector, end: Vector) -> Activity:
     """The joints to angles."""
     checked(end)
-    return travel([joint_leg(joints, end, SpeedLimits((registers.speed,) * 4, (registers.acceleration,) * 4))])
+    return travel([joint_segment(joints, end, SpeedLimits((registers.speed,) * 4, (registers.acceleration,) * 4))])
 
 
 def home(registers: Registers, joints: Vector, _: None) -> Activity:
@@ -210,8 +210,8 @@ def home(registers: Registers, joints: Vector, _: None) -> Activity:
         registers.homed = True
         registers.origin = (0.0,) * 4
 
-    way = joint_leg(joints, (0.0,) * 4, SpeedLimits((60.0,) * 4, (ACCELERATION,) * 4))
-    switches = Leg(lambda _: (0.0,) * 4, trapezoid(1.0, 1 / HOMING, math.inf))
+    way = joint_segment(joints, (0.0,) * 4, SpeedLimits((60.0,) * 4, (ACCELERATION,) * 4))
+    switches = Segment(lambda _: (0.0,) * 4, trapezoid(1.0, 1 / HOMING, math.inf))
     return travel([way, switches], arrived)
 
 
@@ -221,7 +221,7 @@ def joint_jog(registers: Registers, joints: Vector, value: c.JogMove) -> Activit
     place = value.axis - 1
     limit = (REACH.j1, REACH.j2, REACH.j3)[place][value.direction == c.JogDirection.POSITIVE]
     end = (*joints[:place], limit, *joints[place + 1 :])
-    return travel([joint_leg(joints, end, SpeedLimits((speed,) * 4, (ACCELERATION,) * 4))])
+    return travel([joint_segment(joints, end, SpeedLimits((speed,) * 4, (ACCELERATION,) * 4))])
 
 
 def tool_jog(registers: Registers, joints: Vector, value: c.JogMove) -> Activity:
@@ -239,13 +239,13 @@ def tool_jog(registers: Registers, joints: Vector, value: c.JogMove) -> Activity
 
     last = len(ways) - 1
     if not last:
-        return travel([joint_leg(joints, joints, SpeedLimits((speed,) * 4, (ACCELERATION,) * 4))])
+        return travel([joint_segment(joints, joints, SpeedLimits((speed,) * 4, (ACCELERATION,) * 4))])
 
     def at(share: float) -> Vector:
         place = min(int(share * last), last - 1)
         return between(ways[place], ways[place + 1], share * last - place)
 
-    return travel([Leg(at, trapezoid(1.0, speed / last, ACCELERATION / last))])
+    return travel([Segment(at, trapezoid(1.0, speed / last, ACCELERATION / last))])
 
 
 def set_position(registers: Registers, value: c.Position, joints: Vector) -> None:

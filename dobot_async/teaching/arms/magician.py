@@ -15,14 +15,14 @@ from dobot_async.handling.arms import settle_time
 from dobot_async.teaching.base import RecordingLimits, TaughtArm, clip
 from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
 
-__all__ = ["MagicianLimits", "TaughtMagician"]
+__all__ = ["MagicianRecordingLimits", "TaughtMagician"]
 
 STEP = 5.0  # mm between two looks at a line
 SAME = 0.01  # mm by which two tools may differ
 MODES = {"point": c.PTPMode.MOVJ_XYZ, "line": c.PTPMode.MOVL_XYZ, "jump": c.PTPMode.JUMP_XYZ}
 
 
-class MagicianLimits(RecordingLimits):
+class MagicianRecordingLimits(RecordingLimits):
     """The joints and their limits, with the tool that is on the arm."""
 
     family = "magician"
@@ -34,7 +34,7 @@ class MagicianLimits(RecordingLimits):
         self.kinematics = kinematics
 
     @classmethod
-    def of(cls, recording: Recording) -> MagicianLimits:
+    def of(cls, recording: Recording) -> MagicianRecordingLimits:
         """Those of the arm of a recording; without a tool's offset, of one with a suction cup."""
         if not recording.tool_offset:
             return cls(Kinematics())
@@ -98,9 +98,9 @@ class TaughtMagician(TaughtArm):
         self._fastest: tuple[float, ...] = ()
 
     @property
-    def limits(self) -> MagicianLimits:  # type: ignore[override] # the tool may be changed meanwhile
+    def limits(self) -> MagicianRecordingLimits:  # type: ignore[override] # the tool may be changed meanwhile
         """With the tool that it was told."""
-        return MagicianLimits(self.arm.kinematics)
+        return MagicianRecordingLimits(self.arm.kinematics)
 
     @property
     def tool_offset(self) -> tuple[float, ...]:

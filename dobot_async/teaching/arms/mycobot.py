@@ -12,13 +12,13 @@ from dobot_async.arms.mycobot.params import MoveMode
 from dobot_async.teaching.base import RecordingLimits, TaughtArm, clip
 from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
 
-__all__ = ["CobotLimits", "TaughtCobot"]
+__all__ = ["CobotRecordingLimits", "TaughtCobot"]
 
 USUAL = 50
 """Percent of its speed, as its verbs have it."""
 
 
-class CobotLimits(RecordingLimits):
+class CobotRecordingLimits(RecordingLimits):
     """A model's joints, and its ranges of coordinates."""
 
     family = "mycobot"
@@ -31,7 +31,7 @@ class CobotLimits(RecordingLimits):
         self.joints = model.joints
 
     @classmethod
-    def of(cls, recording: Recording) -> CobotLimits:
+    def of(cls, recording: Recording) -> CobotRecordingLimits:
         """Those of the model of a recording; raise ValueError if there is no such model."""
         name = recording.model or DEFAULT
         if name not in MODELS:
@@ -66,7 +66,7 @@ class TaughtCobot(TaughtArm):
 
     def __init__(self, arm: MyCobot) -> None:
         super().__init__(arm)
-        self.limits = CobotLimits(arm.model)
+        self.limits = CobotRecordingLimits(arm.model)
         self.turn = self.limits.axes[-1]
 
     @property

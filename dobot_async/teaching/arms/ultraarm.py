@@ -13,12 +13,12 @@ from dobot_async.errors import CommandRejected
 from dobot_async.teaching.base import RecordingLimits, TaughtArm, clip
 from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
 
-__all__ = ["TaughtUltraArm", "UltraArmLimits"]
+__all__ = ["TaughtUltraArm", "UltraArmRecordingLimits"]
 
 SLOWEST, FASTEST = 1.0, 200.0  # F of the manual
 
 
-class UltraArmLimits(RecordingLimits):
+class UltraArmRecordingLimits(RecordingLimits):
     """The ranges of joints and coordinates."""
 
     family = "ultraarm"
@@ -30,7 +30,7 @@ class UltraArmLimits(RecordingLimits):
         self.limits = limits
 
     @classmethod
-    def of(cls, _: Recording) -> UltraArmLimits:
+    def of(cls, _: Recording) -> UltraArmRecordingLimits:
         """The manual's."""
         return cls(c.MANUAL_LIMITS)
 
@@ -54,7 +54,7 @@ class TaughtUltraArm(TaughtArm):
 
     def __init__(self, arm: UltraArm) -> None:
         super().__init__(arm)
-        self.limits = UltraArmLimits(arm.limits)
+        self.limits = UltraArmRecordingLimits(arm.limits)
 
     async def move(self, step: TaughtStep, percent: float | None) -> None:
         """G0, G1 or M11."""

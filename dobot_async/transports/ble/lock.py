@@ -1,7 +1,7 @@
 """One program at a time: who connects to an arm over BLE claims it on this computer before.
 
 BlueZ lets every program into a connection that one of them has made: each would get the other's answers, and the first
-to disconnect would cut the other off. A claim is a name that only one socket on a computer can have, and that the
+to disconnect would cut the other off. A lock is a name that only one socket on a computer can have, and that the
 kernel frees when its program ends, however it ends. Only Linux has such names, and only BlueZ needs them.
 """
 
@@ -12,10 +12,10 @@ import os
 import socket
 import sys
 
-__all__ = ["Claim", "claim"]
+__all__ = ["DeviceLock", "lock_device"]
 
 
-class Claim:
+class DeviceLock:
     """What nobody else has until it is dropped."""
 
     def __init__(self, held: socket.socket | None) -> None:
@@ -27,10 +27,10 @@ class Claim:
             self._held.close()
 
 
-def claim(address: str) -> Claim | None:
+def lock_device(address: str) -> DeviceLock | None:
     """Claims the device with an address, on the system bus that this program uses; None if somebody else has it."""
     if sys.platform != "linux":
-        return Claim(None)
+        return DeviceLock(None)
 
     world = os.environ.get("DBUS_SYSTEM_BUS_ADDRESS", "")
     name = hashlib.sha256(f"{world} {address}".encode()).hexdigest()
@@ -41,4 +41,4 @@ def claim(address: str) -> Claim | None:
         held.close()
         return None
 
-    return Claim(held)
+    return DeviceLock(held)

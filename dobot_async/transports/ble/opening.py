@@ -10,8 +10,8 @@ from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.errors import ConnectFailed
 from dobot_async.transports.ble.diagnostics import NEAR, NOT_FOUND, trouble
-from dobot_async.transports.ble.lock import Claim, claim
-from dobot_async.transports.ble.scan import Seen, Wanted, connected, listening
+from dobot_async.transports.ble.lock import DeviceLock, lock_device
+from dobot_async.transports.ble.scan import SeenDevice, Wanted, connected, listening
 from dobot_async.transports.ble.transport import PACE, BleTransport
 from dobot_async.transports.options import Option, number, options, words
 
@@ -57,7 +57,7 @@ class Opening:
         self._pace = pace
         self._adapter = adapter
         self._tried: set[str] = set()
-        self._claim = Claim(None)
+        self._lock = DeviceLock(None)
 
     async def transport(self) -> BleTransport:
         """Returns a connection, or raises ConnectFailed."""
@@ -74,12 +74,12 @@ class Opening:
                 if not problem.passing or pause is None:
                     raise ConnectFailed(f"cannot open {self._url}: {problem.text}") from error
             except BaseException:
-                self._claim.drop()  # the arm may have been found just now, and not be connected to yet
+                self._lock.drop()  # the arm may have been found just now, and not be connected to yet
                 raise
 
             await asyncio.sleep(pause)
 
-    async def _found(self) -> Seen:
+    async def _found(self) -> SeenDevice:
         """Returns the arm: one that is connected already, or the first one that is seen."""
         free, used = await connected(self._adapter)
         for seen in free:
@@ -109,13 +109,13 @@ class Opening:
 
         raise ConnectFailed(f"cannot open {self._url}: {self._nobody(others, in_use)}")
 
-    def _takes(self, seen: Seen) -> bool:
+    def _takes(self, seen: SeenDevice) -> bool:
         """Claims a device if it is the one that is wanted, and free."""
-        taken = claim(seen.device.address) if self._wanted.fits(seen) else None
-        self._claim = taken or self._claim
+        taken = lock_device(seen.device.address) if self._wanted.fits(seen) else None
+        self._lock = taken or self._lock
         return taken is not None
 
-    def _nobody(self, others: dict[str, str], in_use: list[Seen]) -> str:
+    def _nobody(self, others: dict[str, str], in_use: list[SeenDevice]) -> str:
         """Why nobody is found."""
         if in_use:
             address = in_use[0].device.address
@@ -127,7 +127,7 @@ class Opening:
         instead = f"only {count}, such as {names}" if others else "nor any other BLE device"
         return f"{who}, {instead}; {NOT_FOUND}"
 
-    async def _connected(self, seen: Seen) -> BleTransport:
+    async def _connected(self, seen: SeenDevice) -> BleTransport:
         """Connects to a device."""
         self.trouble = f"{seen.name or seen.device.address} was seen, but the connection is not made yet; {NEAR}"
         given: dict[str, object] = {"pace": self._pace} if self._pace != PACE else {}
@@ -135,7 +135,7 @@ class Opening:
             given["adapter"] = self._adapter
 
         url = f"ble://{quote(seen.device.address, safe=':')}" + (f"?{urlencode(given)}" if given else "")
-        transport = BleTransport(seen, url=url, pace=self._pace, adapter=self._adapter, claim=self._claim)
+        transport = BleTransport(seen, url=url, pace=self._pace, adapter=self._adapter, lock=self._lock)
         try:
             await transport.connect()
         except BaseException:

@@ -24,7 +24,7 @@ from bleak.backends.scanner import AdvertisementData
 from dobot_async._core.util.tasks import run_shielded, run_within
 from dobot_async.transports.ble.diagnostics import ServiceHangs
 
-__all__ = ["INPUT", "OUTPUT", "SERVICE", "Seen", "Wanted", "connected", "listening"]
+__all__ = ["INPUT", "OUTPUT", "SERVICE", "SeenDevice", "Wanted", "connected", "listening"]
 
 SERVICE = "0003cdd0-0000-1000-8000-00805f9b0131"
 INPUT = "0003cdd1-0000-1000-8000-00805f9b0131"
@@ -41,7 +41,7 @@ ADDRESS = re.compile(r"[0-9a-f]{2}([:_-][0-9a-f]{2}){5}|[0-9a-f]{8}(-[0-9a-f]{4}
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class SeenDevice:
     """A device that was seen, with what is known of it so far.
 
     Attributes:
@@ -68,7 +68,7 @@ class Wanted:
 
     text: str
 
-    def fits(self, seen: Seen) -> bool:
+    def fits(self, seen: SeenDevice) -> bool:
         """Whether this is it."""
         if not self.text:
             return seen.is_arm
@@ -90,10 +90,10 @@ class Scan:
     def __init__(self, adapter: str | None) -> None:
         self._adapter = adapter
         self._changing = asyncio.Lock()
-        self._listeners: set[Callable[[Seen], None]] = set()
+        self._listeners: set[Callable[[SeenDevice], None]] = set()
         self._scanner: BleakScanner | None = None
 
-    async def join(self, listener: Callable[[Seen], None]) -> None:
+    async def join(self, listener: Callable[[SeenDevice], None]) -> None:
         """Tells a listener of everything that is seen from now on, and was seen by this scan before."""
         async with self._changing:
             if self._scanner is None:
@@ -108,7 +108,7 @@ class Scan:
 
             self._listeners.add(listener)
 
-    async def leave(self, listener: Callable[[Seen], None]) -> None:
+    async def leave(self, listener: Callable[[SeenDevice], None]) -> None:
         """The last one to leave ends the scan."""
         async with self._changing:
             self._listeners.discard(listener)
@@ -127,14 +127,14 @@ scans: WeakKeyDictionary[asyncio.AbstractEventLoop, dict[str | None, Scan]] = We
 
 
 @asynccontextmanager
-async def listening(adapter: str | None = None) -> AsyncGenerator[asyncio.Queue[Seen]]:
+async def listening(adapter: str | None = None) -> AsyncGenerator[asyncio.Queue[SeenDevice]]:
     """Scans for the length of a block, and yields where everything that is seen arrives, again and again.
 
     Raises:
         Exception: What bleak says; `trouble` tells what it means.
     """
     scan = scans.setdefault(asyncio.get_running_loop(), {}).setdefault(adapter, Scan(adapter))
-    heard: asyncio.Queue[Seen] = asyncio.Queue()
+    heard: asyncio.Queue[SeenDevice] = asyncio.Queue()
     listener = heard.put_nowait
     try:
         await run_shielded(scan.join(listener))  # a start that is given up half-way would leave BlueZ scanning
@@ -143,9 +143,9 @@ async def listening(adapter: str | None = None) -> AsyncGenerator[asyncio.Queue[
         await run_shielded(scan.leave(listener))
 
 
-def seen_as(device: BLEDevice, advertisement: AdvertisementData) -> Seen:
+def seen_as(device: BLEDevice, advertisement: AdvertisementData) -> SeenDevice:
     """What a device says of itself."""
-    return Seen(
+    return SeenDevice(
         device,
         advertisement.local_name or device.name or "",
         frozenset(uuid.lower() for uuid in advertisement.service_uuids),
@@ -159,7 +159,7 @@ def is_connected(advertisement: AdvertisementData) -> bool:
     return isinstance(said, dict) and bool(cast("dict[str, Any]", said).get("Connected"))
 
 
-async def connected(adapter: str | None = None) -> tuple[list[Seen], list[Seen]]:
+async def connected(adapter: str | None = None) -> tuple[list[SeenDevice], list[SeenDevice]]:
     """Returns the arms that this computer is connected to: those that nobody here uses, and those that somebody does.
 
     A program that crashed leaves its connection behind on Linux, and such an arm is found by no scan. One that
@@ -171,7 +171,7 @@ async def connected(adapter: str | None = None) -> tuple[list[Seen], list[Seen]]
     return await answered(connections(adapter))
 
 
-async def connections(adapter: str | None) -> tuple[list[Seen], list[Seen]]:
+async def connections(adapter: str | None) -> tuple[list[SeenDevice], list[SeenDevice]]:
     """The same, as long as it takes."""
     adapters: Any = getattr(bleak, "BleakAdapter", None)  # bleak has it from 3.1 on
     if adapters is None:
@@ -183,7 +183,7 @@ async def connections(adapter: str | None) -> tuple[list[Seen], list[Seen]]:
     except NotImplementedError:
         return [], []
 
-    found = [Seen(device, device.name or "", frozenset({SERVICE}), connected=True) for device in devices]
+    found = [SeenDevice(device, device.name or "", frozenset({SERVICE}), connected=True) for device in devices]
     if not found or sys.platform != "linux":
         return found, []
 

@@ -28,8 +28,8 @@ from bleak.exc import BleakCharacteristicNotFoundError
 
 from dobot_async._core.util.tasks import Ended, run_shielded, run_within
 from dobot_async.transports.ble.diagnostics import trouble
-from dobot_async.transports.ble.lock import Claim
-from dobot_async.transports.ble.scan import INPUT, OUTPUT, Seen
+from dobot_async.transports.ble.lock import DeviceLock
+from dobot_async.transports.ble.scan import INPUT, OUTPUT, SeenDevice
 
 __all__ = ["PACE", "BleTransport"]
 
@@ -56,9 +56,9 @@ class BleTransport:
     window = 1
     reorder_window = 0.0
 
-    def __init__(self, seen: Seen, *, url: str, pace: float, adapter: str | None, claim: Claim) -> None:
+    def __init__(self, seen: SeenDevice, *, url: str, pace: float, adapter: str | None, lock: DeviceLock) -> None:
         self.url = url
-        self._claim = claim
+        self._lock = lock
         self._pace = pace
         self._loop = asyncio.get_running_loop()
         self._client = BleakClient(
@@ -173,7 +173,7 @@ class BleTransport:
             with suppress(Exception):  # a service that died cannot be told; bleak has released what it had
                 await run_within(DISCONNECT, self._client.disconnect())
         finally:
-            self._claim.drop()
+            self._lock.drop()
 
     def _receive(self, _: Any, data: bytearray) -> None:
         """Keeps what arrives; if nobody takes it, the rest is lost, as a UART's is."""

@@ -26,7 +26,7 @@ from dobot_async.transports.zenoh.config import ZenohConfig, library, reason
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["VERSION", "Crossing", "KeyExpressions", "ZenohSession"]
+__all__ = ["VERSION", "KeyExpressions", "LoopBridge", "ZenohSession"]
 
 T = TypeVar("T")
 ROOT = "dobot"
@@ -58,7 +58,7 @@ class ZenohSession:
     """
 
     def __init__(self, place: ZenohConfig, *, serving: bool = False) -> None:
-        self.crossing = Crossing()
+        self.crossing = LoopBridge()
         self._place = place
         self._serving = serving
         self._zenoh: zenoh.Session | None = None
@@ -124,7 +124,7 @@ class ZenohSession:
                 await run_shielded(run_within(CLOSED, asyncio.to_thread(session.close)))
 
 
-class Crossing:
+class LoopBridge:
     """The way from Zenoh's threads into the event loop: in order, and never in Zenoh's way.
 
     What one sender has under way above a bound is dropped; who counts messages notices.

@@ -10,7 +10,7 @@ from lerobot.teleoperators import Teleoperator
 from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
 
 from dobot_async.sync import MyCobot as Arm
-from dobot_async.sync.twin import Block, same
+from dobot_async.sync.twin import BlockingContext, same
 from dobot_async.teaching import released
 from lerobot_robot_mycobot.config_mycobot import MyCobotLeaderConfig, joints_of
 
@@ -68,7 +68,7 @@ class MyCobotLeader(Teleoperator):
             arm = stack.enter_context(
                 Arm.connect(self.config.url, model=self.config.model, timeout=self.config.timeout)
             )
-            stack.enter_context(Block(lambda: released(arm.asynchronous), same, "released"))
+            stack.enter_context(BlockingContext(lambda: released(arm.asynchronous), same, "released"))
             self._stack = stack.pop_all()
 
         self._arm = arm

@@ -16,9 +16,9 @@ from dobot_async._core.util.shapes import Shape
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.barriers import Barriers
-from dobot_async.fleet.claims import ZoneHolder
-from dobot_async.fleet.seat import FleetArm, Member, tell_to_stop
-from dobot_async.fleet.work import ended, named, on_the_way_out
+from dobot_async.fleet.concurrent import ended, on_the_way_out, with_arm_name
+from dobot_async.fleet.fleet_arm import FleetArm, Member, tell_to_stop
+from dobot_async.fleet.zone_locks import ZoneHolder
 from dobot_async.fleet.zones import Zones
 from dobot_async.traces.recorder import shared
 
@@ -44,8 +44,8 @@ class FleetBase(Generic[A]):
         self.failures: dict[str, DobotError] = {}
         self._groups = groups
         self._zones = Zones(dict(zones), {name: ZoneHolder(name) for name in members})
-        self._barriers = Barriers(self._zones.claims)
-        self._seats = {
+        self._barriers = Barriers(self._zones.locks)
+        self._fleet_arms = {
             name: FleetArm(name, member, self._zones, self._fail, self._works) for name, member in members.items()
         }
         self._stopping: dict[asyncio.Task[None], FleetArm] = {}
@@ -55,7 +55,7 @@ class FleetBase(Generic[A]):
     @asynccontextmanager
     async def _connected(self, options: Mapping[str, Any]) -> AsyncGenerator[Self]:
         """Holds all arms for the length of a block; a trace of all of them is one file."""
-        given = {name: dict(options) for name in self._seats}
+        given = {name: dict(options) for name in self._fleet_arms}
         with ExitStack() as stack:
             if options.get("record") is not None:
                 file = stack.enter_context(shared(options["record"]))
@@ -68,17 +68,17 @@ class FleetBase(Generic[A]):
     async def _held(self, options: Mapping[str, Mapping[str, Any]]) -> AsyncGenerator[None]:
         """Holds all arms, each in a task of its own, with its own options, for the length of a block."""
         leave = asyncio.Event()
-        ready = {name: asyncio.get_running_loop().create_future() for name in self._seats}
+        ready = {name: asyncio.get_running_loop().create_future() for name in self._fleet_arms}
         hosts = {
-            asyncio.create_task(host(seat, options[name], ready[name], leave), name=f"dobot_async {name}"): name
-            for name, seat in self._seats.items()
+            asyncio.create_task(host(fleet_arm, options[name], ready[name], leave), name=f"dobot_async {name}"): name
+            for name, fleet_arm in self._fleet_arms.items()
         }
         try:
             await all_ready(hosts, ready.values())
             yield
         except BaseException as error:
             self._leaving = True
-            tell_to_stop(seat for seat in self._seats.values() if seat.stops_on_error)
+            tell_to_stop(fleet_arm for fleet_arm in self._fleet_arms.values() if fleet_arm.stops_on_error)
             await on_the_way_out(error, ended(hosts))
             raise
 
@@ -93,25 +93,27 @@ class FleetBase(Generic[A]):
         for task in hosts:
             task.result()
 
-    def _seat(self, name: str) -> FleetArm:
+    def _fleet_arm(self, name: str) -> FleetArm:
         """The place of an arm."""
-        if name not in self._seats:
-            raise KeyError(f"no arm {name!r} in this fleet; there are: {', '.join(self._seats)}")
+        if name not in self._fleet_arms:
+            raise KeyError(f"no arm {name!r} in this fleet; there are: {', '.join(self._fleet_arms)}")
 
-        return self._seats[name]
+        return self._fleet_arms[name]
 
     def _affected(self, name: str) -> Collection[FleetArm]:
         """The arms that stop when one fails, itself among them unless it fails alone."""
-        group = self._seats[name].member.group
+        group = self._fleet_arms[name].member.group
         reach = self._groups[group] if group else "fleet"
         if reach == "alone":
             return ()
 
-        return [seat for seat in self._seats.values() if reach == "fleet" or seat.member.group == group]
+        return [
+            fleet_arm for fleet_arm in self._fleet_arms.values() if reach == "fleet" or fleet_arm.member.group == group
+        ]
 
     def _ends(self, name: str, error: BaseException) -> bool:
         """Whether a failure in the work of an arm cancels the work of the others."""
-        alone = name in self._seats and len(self._affected(name)) < len(self._seats)
+        alone = name in self._fleet_arms and len(self._affected(name)) < len(self._fleet_arms)
         return not (alone and isinstance(error, DobotError))
 
     def _causes(self, error: BaseException) -> Collection[str]:
@@ -124,33 +126,33 @@ class FleetBase(Generic[A]):
             return
 
         self.failures[failed.name] = error
-        failed.party.failure = error
-        self._zones.claims.fail([failed.party], error)
+        failed.holder.failure = error
+        self._zones.locks.fail([failed.holder], error)
         self._barriers.fail(failed.name, str(error))
-        affected = [seat for seat in self._affected(failed.name) if not seat.stopped]
-        others = [seat for seat in affected if seat is not failed]
+        affected = [fleet_arm for fleet_arm in self._affected(failed.name) if not fleet_arm.stopped]
+        others = [fleet_arm for fleet_arm in affected if fleet_arm is not failed]
         tell_to_stop(others)
         if failed in affected:
             failed.stopped = MotionStopped(f"{failed.name} does not move, for it has failed: {error}")
 
-        for seat in others:
-            seat.stopped = MotionStopped(f"{seat.name} was stopped because another arm failed: {error}")
-            if not seat.connected:
+        for fleet_arm in others:
+            fleet_arm.stopped = MotionStopped(f"{fleet_arm.name} was stopped because another arm failed: {error}")
+            if not fleet_arm.connected:
                 continue
 
-            if seat.commands:
-                task = seat.queue.begin_stop(seat.stopped)
-                self._stopping[task] = seat
+            if fleet_arm.commands:
+                task = fleet_arm.queue.begin_stop(fleet_arm.stopped)
+                self._stopping[task] = fleet_arm
                 task.add_done_callback(self._stopping.pop)
 
-            self._zones.claims.fail([seat.party], seat.stopped)
+            self._zones.locks.fail([fleet_arm.holder], fleet_arm.stopped)
 
-    def _works(self, seat: FleetArm) -> None:
+    def _works(self, fleet_arm: FleetArm) -> None:
         """An arm may move, whatever it has failed with before."""
-        if seat.party.failure:
-            seat.party.failure = None
-            self._barriers.join(seat.name)
-            del self.failures[seat.name]
+        if fleet_arm.holder.failure:
+            fleet_arm.holder.failure = None
+            self._barriers.join(fleet_arm.name)
+            del self.failures[fleet_arm.name]
 
     @asynccontextmanager
     async def _stopping_others(self) -> AsyncGenerator[None]:
@@ -165,27 +167,29 @@ class FleetBase(Generic[A]):
 
     async def _stops_heard(self) -> list[str]:
         """Waits for the stops that a failure has begun; returns of which arms it is not known whether they stand."""
-        heard = await asyncio.gather(*(seat.stop_heard(task) for task, seat in self._stopping.items()))
+        heard = await asyncio.gather(*(fleet_arm.stop_heard(task) for task, fleet_arm in self._stopping.items()))
         return [problem for problem in heard if problem]
 
 
-async def host(seat: FleetArm, options: Mapping[str, Any], ready: asyncio.Future[None], leave: asyncio.Event) -> None:
+async def host(
+    fleet_arm: FleetArm, options: Mapping[str, Any], ready: asyncio.Future[None], leave: asyncio.Event
+) -> None:
     """Holds one arm's connection until all are to be left; cancelled, it leaves it as by an error."""
-    member = seat.member
+    member = fleet_arm.member
     try:
         options = {**options, **member.options}
-        async with seat.family.kind.connect(member.url, **options) as arm:
+        async with fleet_arm.family.kind.connect(member.url, **options) as arm:
             try:
-                await seat.begin(arm, options)
+                await fleet_arm.begin(arm, options)
                 ready.set_result(None)
                 await leave.wait()
             finally:
-                seat.end()
+                fleet_arm.end()
     except (DobotError, ValueError) as error:
-        named(seat.name, error)
+        with_arm_name(fleet_arm.name, error)
         raise
     finally:
-        await run_shielded(seat.aclose())
+        await run_shielded(fleet_arm.aclose())
 
 
 async def all_ready(hosts: Collection[asyncio.Task[None]], ready: Collection[asyncio.Future[None]]) -> None:

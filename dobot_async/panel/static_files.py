@@ -8,14 +8,14 @@ import mimetypes
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Page", "Pages"]
+__all__ = ["StaticFile", "StaticFiles"]
 
 PACKED = (".html", ".js", ".css", ".svg", ".json", ".txt", ".webmanifest", ".map")
 TYPES = {".js": "text/javascript", ".mjs": "text/javascript", ".webmanifest": "application/manifest+json"}
 
 
 @dataclass(frozen=True, slots=True)
-class Page:
+class StaticFile:
     """One file.
 
     Attributes:
@@ -33,14 +33,14 @@ class Page:
     changed: int
 
 
-class Pages:
+class StaticFiles:
     """The files below a folder, and nothing else."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder.resolve()
-        self._read: dict[str, Page] = {}
+        self._read: dict[str, StaticFile] = {}
 
-    def get(self, name: str) -> Page | None:
+    def get(self, name: str) -> StaticFile | None:
         """Return a file by its path in the folder; None if there is none."""
         path = (self._folder / name).resolve() if "\0" not in name else self._folder
         if not path.is_relative_to(self._folder) or not path.is_file():
@@ -54,13 +54,13 @@ class Pages:
         return found
 
 
-def page_of(path: Path, changed: int) -> Page:
+def page_of(path: Path, changed: int) -> StaticFile:
     """Read a file."""
     data, suffix = path.read_bytes(), path.suffix.lower()
     packed = gzip.compress(data, 9, mtime=0) if suffix in PACKED else b""
     kind = TYPES.get(suffix) or mimetypes.guess_type(path.name)[0] or "application/octet-stream"
     text = kind.startswith("text/") or kind.endswith(("json", "svg+xml"))
     tag = f'"{hashlib.sha256(data).hexdigest()[:20]}"'
-    return Page(
+    return StaticFile(
         data, packed if len(packed) < len(data) else b"", kind + ("; charset=utf-8" if text else ""), tag, changed
     )

@@ -77,11 +77,11 @@ def reach_told(on: RemoteArm) -> dict[str, Any]:
     """Return where the tool of an arm may go: by heights, how near and how far straight in front of the arm."""
     return {
         "arm": on.name,
-        "family": on.manners.title,
+        "family": on.traits.title,
         "units": "mm, in the coordinates of the arm: x forward, y to its left, z up",
         "workspace": shape_told(on.workspace) or "wherever the arm reaches",
         "fastest_percent": on.fastest,
-        "tools": list(on.manners.tools),
+        "tools": list(on.traits.tools),
         "in_front": [each for z in HEIGHTS for each in reach_at(on, float(z))],
     }
 
@@ -100,8 +100,8 @@ def scene_told(site: Site) -> dict[str, Any]:
         "motion": "allowed" if site.moves else "not allowed: only reading and planning",
         "arms": {
             on.name: {
-                "family": on.manners.title,
-                "tools": list(on.manners.tools),
+                "family": on.traits.title,
+                "tools": list(on.traits.tools),
                 "workspace": shape_told(on.workspace),
                 "fastest_percent": on.fastest,
                 "base": asdict(on.base) if on.base else None,

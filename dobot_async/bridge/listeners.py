@@ -39,7 +39,7 @@ from dobot_async.errors import ConnectFailed
 from dobot_async.transports.network import TOKEN as TOKEN_OPTION
 from dobot_async.transports.network import secret
 
-__all__ = ["Listeners", "open_doors"]
+__all__ = ["Listeners", "open_listeners"]
 
 FORMS = "tcp://127.0.0.1:0, udp://127.0.0.1:0, ws://127.0.0.1:0, zenoh://name or pty"
 
@@ -93,16 +93,16 @@ class Listeners:
         return cls(places, token, tls, frozenset(origins))
 
 
-async def open_doors(
-    doors: Listeners, host: Bridge[Any], stack: AsyncExitStack, refuse: Callable[[str, str], None]
+async def open_listeners(
+    listeners: Listeners, host: Bridge[Any], stack: AsyncExitStack, refuse: Callable[[str, str], None]
 ) -> tuple[str, ...]:
     """Lets clients of a host in until the stack is closed; returns the URLs in their order.
 
     `refuse` is called with who was not let in, and why.
     """
-    authenticator = Authenticator(doors.token, doors.origins, host.family.begins, refuse)
+    authenticator = Authenticator(listeners.token, listeners.origins, host.family.begins, refuse)
     urls: list[str] = []
-    for place in doors.places:
+    for place in listeners.places:
         address, port = place.hostname or "", place.port or 0
         try:
             if place.scheme == "pty":
@@ -119,7 +119,7 @@ async def open_doors(
             else:
                 handshakes = Handshakes(host, authenticator, kind_of(place.scheme))
                 scheme = "tcp" if place.scheme == "tcp" else "ws"
-                tls = doors.tls
+                tls = listeners.tls
                 urls.append(await on_tcp(handshakes, stack, address=address, port=port, tls=tls, scheme=scheme))
                 stack.callback(handshakes.close)
         except OSError as error:

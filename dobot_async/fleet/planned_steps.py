@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 from dobot_async._core.queue.motion import Motion
 from dobot_async.fleet.planner import Region, Stance
 
-__all__ = ["PlannedCourse", "PlannedStep", "shifted"]
+__all__ = ["PlannedStep", "PlannedSteps", "shifted"]
 
 S = TypeVar("S", bound=Stance)
 
@@ -36,7 +36,7 @@ class PlannedStep:
 
 
 @dataclass(frozen=True, slots=True)
-class PlannedCourse(Generic[S]):
+class PlannedSteps(Generic[S]):
     """Several commands that are sent together, looked at before they are.
 
     Attributes:

@@ -15,16 +15,16 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.arms.base import Arm
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped
-from dobot_async.fleet.claims import ZoneRequest
-from dobot_async.fleet.course import PlannedCourse, PlannedStep
+from dobot_async.fleet.concurrent import with_arm_name
 from dobot_async.fleet.families import FleetFamily, family_of
 from dobot_async.fleet.follower import Follower
 from dobot_async.fleet.guard import Guard
 from dobot_async.fleet.limits import FleetLimits
 from dobot_async.fleet.member import Member
+from dobot_async.fleet.planned_steps import PlannedStep, PlannedSteps
 from dobot_async.fleet.queue import FleetQueue
 from dobot_async.fleet.turn import Turn
-from dobot_async.fleet.work import named
+from dobot_async.fleet.zone_locks import ZoneRequest
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["FleetArm", "Member", "tell_to_stop"]
@@ -34,20 +34,20 @@ recovering: ContextVar[FleetArm | None] = ContextVar("recovering", default=None)
 """The arm that is made ready again here: what that takes, such as power, passes though the arm is stopped."""
 
 
-def tell_to_stop(seats: Iterable[FleetArm]) -> None:
+def tell_to_stop(fleet_arms: Iterable[FleetArm]) -> None:
     """Tells arms to stop before this returns, as far as their links can; `begin_stop` of each is to follow."""
-    for seat in seats:
-        seat.tell_to_stop()
+    for fleet_arm in fleet_arms:
+        fleet_arm.tell_to_stop()
 
 
 class FleetArm:
-    """The place of one arm in its fleet; the `Overseer` of its queue.
+    """The place of one arm in its fleet; the `MotionGate` of its queue.
 
     Attributes:
         name: The arm's.
         member: What it is.
         family: Its family.
-        party: As what it holds zones.
+        holder: As what it holds zones.
         guard: What keeps it out of zones that others hold, if anything does.
         stopped: Why it may not move; None while all is well.
         commands: Whether it is connected to command it, not only to look on.
@@ -65,7 +65,7 @@ class FleetArm:
         self.name = name
         self.member = member
         self.family: FleetFamily = family_of(member.kind)
-        self.party = zones.arms[name]
+        self.holder = zones.arms[name]
         self.guard: Guard[Any] | None = None
         self.stopped: DobotError | None = None
         self.commands = self.stops_on_error = False
@@ -110,7 +110,7 @@ class FleetArm:
                 self.family.planner(arm, member.rail),
                 self.queue,
                 self._zones,
-                self.party,
+                self.holder,
                 base=member.base,
                 mode=member.guard,
                 clearance=member.clearance,
@@ -124,14 +124,14 @@ class FleetArm:
 
             self._zones.guards.append(guard.catch_up)
 
-        self.queue.overseer = self
+        self.queue.gate = self
         if arm.link.state.value is LinkState.LOST:  # when its queue could not tell yet
             self.ended(ConnectionLost(f"the connection to {arm.link.url} was lost"))
 
     def end(self) -> set[asyncio.Task[None]]:
         """Leaves the arm to itself; returns the tasks that end because of it."""
         if self.connected:
-            self.queue.overseer = None
+            self.queue.gate = None
 
         for task in self._tasks:
             task.cancel()
@@ -160,7 +160,7 @@ class FleetArm:
             self.end_turn()
 
     @asynccontextmanager
-    async def roaming(self, halt: Callable[[], Awaitable[None]] | None) -> AsyncGenerator[None]:
+    async def unplanned_motion(self, halt: Callable[[], Awaitable[None]] | None) -> AsyncGenerator[None]:
         """While this is entered, the arm may go anywhere, but for its limits, where it is stopped."""
         guard = self.guard
         async with self._turn():
@@ -169,12 +169,12 @@ class FleetArm:
                 return
 
             if halt is None or not guard.is_limited:
-                async with guard.roaming():
+                async with guard.unplanned_motion():
                     yield
 
                 return
 
-            async with guard.roaming():
+            async with guard.unplanned_motion():
                 watch = self._spawn(guard.halt_at_limits(halt), "limits")
                 try:
                     yield
@@ -211,9 +211,9 @@ class FleetArm:
         if self.guard:
             self.guard.unsure()
 
-        self._zones.claims.interrupt(self.party, error)
+        self._zones.locks.interrupt(self.holder, error)
         if not isinstance(error, MotionStopped):
-            named(self.name, error)
+            with_arm_name(self.name, error)
             self._failed(self, error)
 
     async def recover(self) -> None:
@@ -274,17 +274,17 @@ class FleetArm:
         self._turns.end()
         self._follower.follow()
 
-    async def plan(self, motions: Sequence[Motion]) -> PlannedCourse[Any]:
+    async def plan(self, motions: Sequence[Motion]) -> PlannedSteps[Any]:
         """Looks at what is to be sent together; see `Guard.plan`."""
         if self.guard:
             return await self.guard.plan(motions)
 
-        return PlannedCourse([PlannedStep(motion) for motion in motions], None, moves=False)
+        return PlannedSteps([PlannedStep(motion) for motion in motions], None, moves=False)
 
-    def enter(self, course: PlannedCourse[Any], claim: ZoneRequest | None) -> None:
-        """Takes note of what is sent now, with the claim on its zones."""
+    def enter(self, course: PlannedSteps[Any], request: ZoneRequest | None) -> None:
+        """Takes note of what is sent now, with the request on its zones."""
         if self.guard:
-            self.guard.enter(course, claim)
+            self.guard.enter(course, request)
         else:
             self._steps.extend(course.steps)
 
@@ -296,23 +296,23 @@ class FleetArm:
         await self.take_turn(deadline)
         try:
             course = await self.plan(motions)
-            claim = await self.guard.claim(course.zones, deadline) if self.guard else None
+            request = await self.guard.request(course.zones, deadline) if self.guard else None
             try:
                 self.check()
                 epoch.check()
             except BaseException:
-                if claim:
-                    self._zones.claims.release(claim)
+                if request:
+                    self._zones.locks.release(request)
 
                 raise
 
-            self.enter(course, claim)
+            self.enter(course, request)
         except BaseException:
             self.end_turn()
             raise
 
     def _spawn(self, work: Any, what: str) -> asyncio.Task[None]:
-        """Starts a task that ends with the seat."""
+        """Starts a task that ends when the arm leaves its fleet."""
         task: asyncio.Task[None] = asyncio.create_task(work, name=f"dobot_async {self.name} {what}")
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

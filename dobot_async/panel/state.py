@@ -12,20 +12,20 @@ from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async._core.util.text import printable
 from dobot_async.panel.access import Role
 from dobot_async.panel.drawings import Drawings
-from dobot_async.panel.holding import BEAT, PATIENCE, Ticks
+from dobot_async.panel.hold_to_run import BEAT, PATIENCE, Ticks
 from dobot_async.panel.messages import Hub, as_json
-from dobot_async.panel.problems import Refusal
-from dobot_async.panel.session import Session
+from dobot_async.panel.problems import PanelRefusal
+from dobot_async.panel.session import PageSession
 from dobot_async.panel.sources import Source
 from dobot_async.panel.station import Station
 
-__all__ = ["Desk"]
+__all__ = ["PanelState"]
 
 VERSION = 1
 SESSIONS = 32
 
 
-class Desk:
+class PanelState:
     """See the module.
 
     Attributes:
@@ -48,7 +48,7 @@ class Desk:
         self.stations = {name: Station(name, source, self.hub, self._told) for name, source in sources.items()}
         self.drawings = Drawings()
         self.ticks = Ticks()
-        self.sessions: set[Session] = set()
+        self.sessions: set[PageSession] = set()
         self._zones = zones
         self._scene = scene
         self._stop_all = stop_all
@@ -80,17 +80,19 @@ class Desk:
     def station(self, name: object) -> Station:
         """Return an arm; raise Refusal if there is none of that name."""
         if not isinstance(name, str) or name not in self.stations:
-            raise Refusal("wrong", f"there is no arm {printable(repr(name))}; there are: {', '.join(self.stations)}")
+            raise PanelRefusal(
+                "wrong", f"there is no arm {printable(repr(name))}; there are: {', '.join(self.stations)}"
+            )
 
         return self.stations[name]
 
-    def join(self, role: Role, address: str) -> Session:
+    def join(self, role: Role, address: str) -> PageSession:
         """Somebody has connected; raise Refusal if there are too many."""
         if len(self.sessions) >= SESSIONS:
-            raise Refusal("rate", f"{SESSIONS} pages are connected, which is as many as may be")
+            raise PanelRefusal("rate", f"{SESSIONS} pages are connected, which is as many as may be")
 
         name = f"{role.value} {next(self._numbers)} ({printable(address, 60)})"
-        session = Session(self, role, name)
+        session = PageSession(self, role, name)
         self.sessions.add(session)
         session.outlet.put(as_json(self._hello(session)))
         for station in self.stations.values():
@@ -99,12 +101,12 @@ class Desk:
         self.hub.add(session.outlet)
         return session
 
-    def leave(self, session: Session) -> None:
+    def leave(self, session: PageSession) -> None:
         """A page has gone."""
         self.sessions.discard(session)
         self.hub.remove(session.outlet)
 
-    async def stop_all(self, by: Session) -> None:
+    async def stop_all(self, by: PageSession) -> None:
         """Stop all arms, at the same time."""
         work: list[Awaitable[None]] = [station.stop(by) for station in self.stations.values() if station.connected]
         if self._stop_all:
@@ -118,7 +120,7 @@ class Desk:
         """Tell everybody something that is about no arm."""
         self.hub.log(time=time.time(), text=text, level="info")
 
-    def _hello(self, session: Session) -> dict[str, Any]:
+    def _hello(self, session: PageSession) -> dict[str, Any]:
         return {
             "type": "hello",
             "role": session.role.value,
@@ -131,7 +133,7 @@ class Desk:
             "scene": self._scene,
         }
 
-    def _lease(self, station: Station, session: Session) -> dict[str, Any]:
+    def _lease(self, station: Station, session: PageSession) -> dict[str, Any]:
         holder = station.lease.holder
         return {"arm": station.name, "holder": holder.name if holder else None, "mine": holder is session}
 
@@ -145,7 +147,7 @@ class Desk:
         if self._ticking is None and self._leased():
             self._ticking = asyncio.create_task(self._tick(), name="dobot_async panel ticks")
 
-    def _leased(self) -> set[Session]:
+    def _leased(self) -> set[PageSession]:
         holders = {station.lease.holder for station in self.stations.values()}
         return {session for session in self.sessions if session in holders}
 

@@ -9,14 +9,14 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from dobot_async.panel.arms import ArmView
-from dobot_async.panel.problems import Refusal
+from dobot_async.panel.problems import PanelRefusal
 from dobot_async.teaching import Recorder, Recording, RecordingUnfit, TaughtStep, check_recording, play
 from dobot_async.teaching.files import from_json, to_json
 from dobot_async.teaching.playback_file import read_playback, write_playback
 
 if TYPE_CHECKING:
+    from dobot_async.panel.arm_tasks import ArmTask
     from dobot_async.panel.station import Station
-    from dobot_async.panel.works import Work
 
 __all__ = ["Taught"]
 
@@ -47,7 +47,7 @@ class Taught:
     def set(self, steps: Sequence[TaughtStep]) -> None:
         """Take other steps; raise Refusal if they are too many."""
         if len(steps) > MOST:
-            raise Refusal("wrong", f"a list has {MOST} steps at most")
+            raise PanelRefusal("wrong", f"a list has {MOST} steps at most")
 
         self.recording = replace(self._known, steps=tuple(steps))
         self._tell()
@@ -80,7 +80,7 @@ class Taught:
         steps[index] = replace(steps[self._at(index)], **changes)
         self.set(steps)
 
-    async def play(self, view: ArmView, work: Work, **options: Any) -> None:
+    async def play(self, view: ArmView, work: ArmTask, **options: Any) -> None:
         """Let the arm do it."""
         works = self._station.works
 
@@ -104,7 +104,7 @@ class Taught:
             raise ValueError("it has a path in time, and no steps: dobot-async play plays it")
 
         if len(found.steps) > MOST:
-            raise Refusal("wrong", f"a list has {MOST} steps at most")
+            raise PanelRefusal("wrong", f"a list has {MOST} steps at most")
 
         self._loaded = f"r{next(numbers)}", found
         return {"file": self._loaded[0], "steps": len(found.steps), "remarks": list(found.remarks)}
@@ -112,7 +112,7 @@ class Taught:
     def load(self, file: str) -> None:
         """Take what was read from a file in place of the list."""
         if self._loaded is None or self._loaded[0] != file:
-            raise Refusal("file", "this file is not here any more: load it again")
+            raise PanelRefusal("file", "this file is not here any more: load it again")
 
         known = self._known
         self.recording = replace(self._loaded[1], model=self._loaded[1].model or known.model)
@@ -121,7 +121,7 @@ class Taught:
     @property
     def _known(self) -> Recording:
         if self.recording is None:
-            raise Refusal("link", f"{self._station.name} was not connected yet")
+            raise PanelRefusal("link", f"{self._station.name} was not connected yet")
 
         return self.recording
 

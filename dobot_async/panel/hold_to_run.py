@@ -1,7 +1,7 @@
 """Hold to move: an arm moves as long as beats come from a page, by this computer's clock.
 
-    Ticks.number --tick--> page --beat, with the newest tick--> Hold.beat        each moves the end on
-                                                                 Hold.over        "released", "no beat", ...
+    Ticks.number --tick--> page --beat, with the newest tick--> HoldToRun.beat        each moves the end on
+                                                                 HoldToRun.over        "released", "no beat", ...
 
 1. A beat counts if the tick that it brings back was sent at most `PATIENCE` ago: what a network has kept back for
    longer tells nothing of the hand that holds now.
@@ -18,7 +18,7 @@ from typing import TypeVar
 
 from dobot_async._core.util.tasks import cancel_and_join
 
-__all__ = ["BEAT", "PATIENCE", "Hold", "Ticks", "held"]
+__all__ = ["BEAT", "PATIENCE", "HoldToRun", "Ticks", "held"]
 
 T = TypeVar("T")
 BEAT = 0.1  # seconds between two ticks
@@ -50,7 +50,7 @@ class Ticks:
         return any(each == number and sent >= since for each, sent in self._sent)
 
 
-class Hold:
+class HoldToRun:
     """One press of a hand.
 
     Attributes:
@@ -101,7 +101,7 @@ class Hold:
 
 
 async def held(
-    hold: Hold,
+    hold: HoldToRun,
     block: Callable[[], AbstractAsyncContextManager[T]],
     begun: Callable[[T], None],
 ) -> str:

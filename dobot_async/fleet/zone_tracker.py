@@ -9,7 +9,7 @@
 3. An arm without anything to do is looked at again before its next motion: it may have been switched off, or led by
    hand.
 4. An arm that was switched off and on does not know where it is: it may be anywhere in its reach until it was homed.
-5. Whatever ends, a step, a jog or a look, all claims are judged anew: an arm that does not tell where it stands keeps
+5. Whatever ends, a step, a jog or a look, all requests are judged anew: an arm that does not tell where it stands keeps
    what it holds, and yet it rests. It is asked again until it tells.
 """
 
@@ -23,13 +23,13 @@ from typing import Generic, Protocol, TypeVar
 
 from dobot_async.arms.magician.paths import STEP
 from dobot_async.errors import DobotError
-from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
-from dobot_async.fleet.course import PlannedCourse, PlannedStep
 from dobot_async.fleet.frames import BaseFrame
+from dobot_async.fleet.planned_steps import PlannedStep, PlannedSteps
 from dobot_async.fleet.planner import Planner, Region, Stance
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneRequest
 from dobot_async.fleet.zones import Zones
 
-__all__ = ["Stops", "Whereabouts"]
+__all__ = ["StopWaiter", "ZoneTracker"]
 
 S = TypeVar("S", bound=Stance)
 BETWEEN_READINGS = 0.1  # seconds
@@ -37,14 +37,14 @@ AT_REST = 0.05  # mm between two readings of an arm that stands; the slowest of 
 ROUNDING = 0.1  # mm; what numbers lose on the line, and an arc bulges between two places
 
 
-class Stops(Protocol):
+class StopWaiter(Protocol):
     """The arm's queue, as far as the guard is concerned."""
 
     async def stops_heard(self) -> None:
         """Return when no stop goes on any more; raise ReplyTimeout if the arm does not hear it."""
 
 
-class Whereabouts(Generic[S]):
+class ZoneTracker(Generic[S]):
     """The part of `Guard` that follows its arm.
 
     Args:
@@ -52,7 +52,7 @@ class Whereabouts(Generic[S]):
         planner: What is known of its ways.
         queue: Its queue.
         zones: Those of the cell.
-        party: As what it holds them.
+        holder: As what it holds them.
         base: Where it stands.
         clearance: mm around the tool.
     """
@@ -61,9 +61,9 @@ class Whereabouts(Generic[S]):
         self,
         steps: deque[PlannedStep],
         planner: Planner[S],
-        queue: Stops,
+        queue: StopWaiter,
         zones: Zones,
-        party: ZoneHolder,
+        holder: ZoneHolder,
         *,
         base: BaseFrame,
         clearance: float,
@@ -72,10 +72,10 @@ class Whereabouts(Generic[S]):
         self._planner = planner
         self._queue = queue
         self._zones = zones
-        self._party = party
+        self._holder = holder
         self._base = base
         self._margin = clearance + STEP / 2 + ROUNDING
-        self._claims: list[ZoneRequest] = []
+        self._requests: list[ZoneRequest] = []
         self._stance: S | None = None  # after all steps
         self._standing: frozenset[str] = frozenset()
         self._located = False
@@ -83,23 +83,23 @@ class Whereabouts(Generic[S]):
         self._mute = False  # whether it did not tell where it is when it was asked last
         self._looking = 0
         self._plans = 0
-        party.moving = lambda: bool(steps or self._loose or self._looking)
+        holder.moving = lambda: bool(steps or self._loose or self._looking)
 
     @property
     def holds(self) -> frozenset[str]:
         """The zones that the arm is in, or has ahead."""
-        return frozenset[str]().union(*(claim.zones for claim in self._claims))
+        return frozenset[str]().union(*(request.zones for request in self._requests))
 
-    def enter(self, course: PlannedCourse[S], claim: ZoneRequest | None) -> None:
-        """Take note that what was looked at is sent now, with a claim on its zones that was granted."""
-        if claim:
-            self._claims.append(claim)
+    def enter(self, course: PlannedSteps[S], request: ZoneRequest | None) -> None:
+        """Take note that what was looked at is sent now, with a request on its zones that was granted."""
+        if request:
+            self._requests.append(request)
 
         self._steps.extend(course.steps)
         for step in course.steps:
             step.homing = self._planner.begun(step.motion.entry.value)
             if step.motion.moves:
-                self._party.inside &= step.after or frozenset()
+                self._holder.inside &= step.after or frozenset()
 
         if course.moves:
             self._plans += 1
@@ -172,7 +172,7 @@ class Whereabouts(Generic[S]):
     @property
     def is_sought(self) -> bool:
         """Whether the arm rests somewhere that it is still to be asked about. One that has failed is asked once."""
-        return not (self._located or self._busy or (self._mute and self._party.failure))
+        return not (self._located or self._busy or (self._mute and self._holder.failure))
 
     @property
     def _busy(self) -> bool:
@@ -201,12 +201,12 @@ class Whereabouts(Generic[S]):
             self.unsure()
 
     @asynccontextmanager
-    async def _loosened(self, claim: ZoneRequest | None) -> AsyncGenerator[None]:
-        """While this is entered, the arm may be wherever a claim lets it, and its stance is not known."""
-        if claim:
-            self._claims.append(claim)
+    async def _loosened(self, request: ZoneRequest | None) -> AsyncGenerator[None]:
+        """While this is entered, the arm may be wherever a request lets it, and its stance is not known."""
+        if request:
+            self._requests.append(request)
 
-        zones = claim.zones if claim else frozenset[str]()
+        zones = request.zones if request else frozenset[str]()
         self._loose.append(zones)
         self.unsure()
         try:
@@ -235,12 +235,12 @@ class Whereabouts(Generic[S]):
         if self._planner.astray:
             self._stance = None
             self._standing |= self._anywhere()
-            self._party.inside &= self.holds  # another one may be where it was looked at last
+            self._holder.inside &= self.holds  # another one may be where it was looked at last
         else:
             region, self._stance = stance.region, stance
             self._standing = self._zones_of(region)
             inside = region.zones(self._zones, self._base, ROUNDING)
-            self._party.inside = inside if region.known else frozenset()
+            self._holder.inside = inside if region.known else frozenset()
 
     def _forget(self) -> None:
         """Drop steps that have failed; the arm may be anywhere on their way."""
@@ -261,13 +261,13 @@ class Whereabouts(Generic[S]):
         A zone that another arm holds is not taken by who is only near it: who holds a zone may move in it.
         """
         ahead = frozenset[str]().union(*self._loose, *(step.zones for step in self._steps))
-        others = (claim.zones for claim in self._zones.claims.held if claim.party is not self._party)
+        others = (request.zones for request in self._zones.locks.held if request.holder is not self._holder)
         needed = ahead | self._standing
-        missing = (ahead | self._party.inside & self._standing | self._standing.difference(*others)) - self.holds
+        missing = (ahead | self._holder.inside & self._standing | self._standing.difference(*others)) - self.holds
         if missing:
-            claim = ZoneRequest(self._party, frozenset([self._party]), missing)
-            self._claims.append(claim)
-            self._zones.claims.take(claim)
+            request = ZoneRequest(self._holder, frozenset([self._holder]), missing)
+            self._requests.append(request)
+            self._zones.locks.take(request)
 
-        self._zones.claims.keep(self._claims, needed)
-        self._claims = [claim for claim in self._claims if claim.zones]
+        self._zones.locks.keep(self._requests, needed)
+        self._requests = [request for request in self._requests if request.zones]

@@ -15,7 +15,7 @@ from dobot_async.arms.magician.arm import Magician
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.ultraarm.arm import UltraArm
 
-__all__ = ["MANNERS", "Manners", "manners_of"]
+__all__ = ["FAMILY_TRAITS", "FamilyTraits", "traits_of"]
 
 FASTEST_PEN = 100.0
 """mm/s of a pen at 100 percent."""
@@ -25,7 +25,7 @@ HOMING = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Manners:
+class FamilyTraits:
     """One family.
 
     Attributes:
@@ -68,8 +68,8 @@ def millimetres(percent: float) -> Mapping[str, Any]:
     return {"speed": FASTEST_PEN * percent / 100}
 
 
-MANNERS: Mapping[type, Manners] = {
-    Magician: Manners(
+FAMILY_TRAITS: Mapping[type, FamilyTraits] = {
+    Magician: FamilyTraits(
         "Dobot Magician",
         lambda arm, percent: arm.set_speed(percent),
         nothing,
@@ -78,7 +78,7 @@ MANNERS: Mapping[type, Manners] = {
         options={"check_reach": True},
         turns=True,
     ),
-    MyCobot: Manners(
+    MyCobot: FamilyTraits(
         "myCobot",
         each_motion_says_it,
         lambda percent: {"speed": whole(percent)},
@@ -86,7 +86,7 @@ MANNERS: Mapping[type, Manners] = {
         lambda percent: {"percent": whole(percent)},
         tools=("gripper",),
     ),
-    UltraArm: Manners(
+    UltraArm: FamilyTraits(
         "ultraArm P340",
         each_motion_says_it,
         lambda percent: {"speed": max(1.0, 2 * percent)},
@@ -96,10 +96,10 @@ MANNERS: Mapping[type, Manners] = {
 }
 
 
-def manners_of(kind: type) -> Manners:
+def traits_of(kind: type) -> FamilyTraits:
     """Return what is known of an arm's class; raise ValueError for one of another family."""
-    for family, manners in MANNERS.items():
+    for family, traits in FAMILY_TRAITS.items():
         if issubclass(kind, family):
-            return manners
+            return traits
 
     raise ValueError(f"nothing is known of how fast a {kind.__name__} may go")

@@ -23,13 +23,13 @@ from typing import Any, cast
 
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async._core.util.text import printable
-from dobot_async.bridge.desk import Refused
 from dobot_async.bridge.lease import Lease
+from dobot_async.bridge.requests import Refused
 from dobot_async.errors import DobotError
 from dobot_async.mqtt.topics import SESSION
 from dobot_async.remote import RemoteArm, Works, parse_action
 
-__all__ = ["Desk", "Party"]
+__all__ = ["CommandHandler", "MqttSession"]
 
 logger = logging.getLogger("dobot_async.mqtt")
 LONGEST = 1 << 18  # bytes of a message
@@ -41,7 +41,7 @@ FREE = ("stop", "take_lease", "release_lease")
 """What needs no id: it may be done twice."""
 
 
-class Party:
+class MqttSession:
     """A session that has, or had, the lease.
 
     Attributes:
@@ -62,7 +62,7 @@ class Party:
             self.timer.cancel()
 
 
-class Desk:
+class CommandHandler:
     """See the module.
 
     Args:
@@ -83,7 +83,7 @@ class Desk:
         self._on = on
         self._reply = reply
         self._changed = changed
-        self._lease: Lease[Party] = Lease(takeover=False, leave=end_works, cut=keep, tell=self._tell)
+        self._lease: Lease[MqttSession] = Lease(takeover=False, leave=end_works, cut=keep, tell=self._tell)
         self._told: OrderedDict[tuple[str, str], dict[str, Any] | None] = OrderedDict()
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -145,16 +145,16 @@ class Desk:
 
         return {"stopped": self._on.name}
 
-    async def _take_lease(self, session: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    async def _take_lease(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         seconds = seconds_of(given)
         holder = self._lease.holder
-        party = holder if holder and holder.name == session and not holder.gone else Party(session)
-        await self._lease.take(party)
-        if party.timer:
-            party.timer.cancel()
+        session = holder if holder and holder.name == name and not holder.gone else MqttSession(name)
+        await self._lease.take(session)
+        if session.timer:
+            session.timer.cancel()
 
-        party.timer = asyncio.get_running_loop().call_later(seconds, self._expire, party)
-        return {"lease": session, "seconds": seconds}
+        session.timer = asyncio.get_running_loop().call_later(seconds, self._expire, session)
+        return {"lease": name, "seconds": seconds}
 
     async def _release_lease(self, session: str, given: Mapping[str, Any]) -> dict[str, Any]:
         only(given)
@@ -212,31 +212,31 @@ class Desk:
 
         return False
 
-    def _expire(self, party: Party) -> None:
+    def _expire(self, session: MqttSession) -> None:
         """A lease is over."""
-        party.leave()
-        for task in list(party.works):
+        session.leave()
+        for task in list(session.works):
             task.cancel()
 
-        self._start(self._lease.end(party), party.name, "end of the lease")
+        self._start(self._lease.end(session), session.name, "end of the lease")
 
     def _start(self, work: Coroutine[Any, Any, None], session: str, what: object) -> None:
         task = asyncio.create_task(work, name=f"dobot_async mqtt {what} of {session}")
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _tell(self, what: str, party: Party, detail: str) -> None:
-        logger.info("%s: %s: %s: %s", self._on.name, party.name, what, detail)
+    def _tell(self, what: str, session: MqttSession, detail: str) -> None:
+        logger.info("%s: %s: %s: %s", self._on.name, session.name, what, detail)
         self._changed()
 
 
-def keep(_party: Party, _reason: str) -> None:
+def keep(_party: MqttSession, _reason: str) -> None:
     """Nobody takes a lease from who has it, so nobody is cut off."""
 
 
-async def end_works(party: Party) -> None:
+async def end_works(session: MqttSession) -> None:
     """End what a session has the arm do; when this returns the arm was stopped."""
-    for task in list(party.works):
+    for task in list(session.works):
         await cancel_and_join(task)
 
 

@@ -13,13 +13,13 @@ from dobot_async._core.util.tasks import LEAVING, join
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.errors import BarrierBroken
 
-__all__ = ["all_of", "ended", "named", "on_the_way_out", "side_by_side"]
+__all__ = ["ended", "on_the_way_out", "run_all", "run_concurrently", "with_arm_name"]
 
 T = TypeVar("T")
 CONSEQUENCES = (MotionStopped, BarrierBroken, asyncio.CancelledError)
 
 
-async def side_by_side(
+async def run_concurrently(
     work: Mapping[str, Coroutine[Any, Any, T]],
     *,
     ends: Callable[[str, BaseException], bool] = lambda _name, _error: True,
@@ -67,10 +67,14 @@ async def side_by_side(
     return {name: task.result() for task, name in tasks.items()}
 
 
-async def all_of(work: Mapping[str, Coroutine[Any, Any, Any]]) -> None:
+async def run_all(work: Mapping[str, Coroutine[Any, Any, Any]]) -> None:
     """Does everything at the same time, to its end, whatever fails; then raises the first failure, with the others."""
     results = await asyncio.gather(*work.values(), return_exceptions=True)
-    errors = [named(name, error) for name, error in zip(work, results, strict=True) if isinstance(error, BaseException)]
+    errors = [
+        with_arm_name(name, error)
+        for name, error in zip(work, results, strict=True)
+        if isinstance(error, BaseException)
+    ]
     if errors:
         for other in errors[1:]:
             errors[0].add_note(f"and {other}")
@@ -78,7 +82,7 @@ async def all_of(work: Mapping[str, Coroutine[Any, Any, Any]]) -> None:
         raise errors[0]
 
 
-def named(name: str, error: BaseException) -> BaseException:
+def with_arm_name(name: str, error: BaseException) -> BaseException:
     """Returns an error of an arm; its message gets the arm's name if it is one of ours."""
     if isinstance(error, (DobotError, ValueError)) and not str(error).startswith(f"{name}: "):
         error.args = (f"{name}: {error}", *error.args[1:])

@@ -1,7 +1,7 @@
 """One message of a page, and what can be done with it.
 
 An action reads its arguments at once, so that what is wrong is told before anything is done, and returns a value, or
-what is to be awaited. A motion is a `Work` of its arm.
+what is to be awaited. A motion is a `ArmTask` of its arm.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from dobot_async.panel.arguments import Arguments
+from dobot_async.panel.arm_tasks import ArmTask
 from dobot_async.panel.arms import ArmView
-from dobot_async.panel.works import Work
 
 if TYPE_CHECKING:
-    from dobot_async.panel.session import Session
+    from dobot_async.panel.session import PageSession
     from dobot_async.panel.station import Station
 
-__all__ = ["Action", "Call", "told_of_tools", "verb"]
+__all__ = ["PageRequest", "PanelAction", "told_of_tools", "verb"]
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class PageRequest:
     """One message.
 
     Attributes:
@@ -33,7 +33,7 @@ class Call:
         number: The page's number for it.
     """
 
-    session: Session
+    session: PageSession
     at: Station | None
     given: Arguments
     number: int | None
@@ -45,11 +45,11 @@ class Call:
         return self.at
 
     def work(
-        self, text: str, doing: Callable[[ArmView, Work], Coroutine[Any, Any, Any]], **manner: Any
+        self, text: str, doing: Callable[[ArmView, ArmTask], Coroutine[Any, Any, Any]], **manner: Any
     ) -> Coroutine[Any, Any, Any]:
         """Begin something that moves the arm; return what waits for its end."""
         self.given.end()
-        work = Work(text, self.session.name, **manner)
+        work = ArmTask(text, self.session.name, **manner)
         task = self.station.start(work, lambda view: doing(view, work), self.session)
         return ended(task)
 
@@ -60,7 +60,7 @@ async def ended(task: asyncio.Task[Any]) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
-class Action:
+class PanelAction:
     """What can be asked for.
 
     Attributes:
@@ -69,20 +69,22 @@ class Action:
         arm: It is about one arm.
     """
 
-    run: Callable[[Call], Any]
+    run: Callable[[PageRequest], Any]
     lease: Literal["held", "may", ""] = "held"
     arm: bool = True
 
 
-def verb(text: str, do: Callable[[ArmView], Coroutine[Any, Any, Any]]) -> Action:
+def verb(text: str, do: Callable[[ArmView], Coroutine[Any, Any, Any]]) -> PanelAction:
     """Return an action without arguments."""
-    return Action(lambda call: call.work(text, lambda view, _: do(view)))
+    return PanelAction(lambda call: call.work(text, lambda view, _: do(view)))
 
 
-def told_of_tools(call: Call, text: str, do: Callable[[ArmView], Coroutine[Any, Any, Any]]) -> Coroutine[Any, Any, Any]:
+def told_of_tools(
+    call: PageRequest, text: str, do: Callable[[ArmView], Coroutine[Any, Any, Any]]
+) -> Coroutine[Any, Any, Any]:
     """Switch something, also beside a jog, and tell everybody."""
 
-    async def done(view: ArmView, _: Work) -> None:
+    async def done(view: ArmView, _: ArmTask) -> None:
         try:
             await do(view)
         finally:

@@ -21,7 +21,7 @@ from dobot_async.panel.reach import reach_of_view
 if TYPE_CHECKING:
     from dobot_async.panel.station import Station
 
-__all__ = ["PERIOD", "Watch"]
+__all__ = ["PERIOD", "ArmPoller"]
 
 PERIOD = 0.05
 SELDOM = 1.0
@@ -31,7 +31,7 @@ MOVES = 0.02  # degrees between two readings from which on a joint moves
 KEPT = 20  # readings of which the round trip is the middle one
 
 
-class Watch:
+class ArmPoller:
     """Reads one arm.
 
     Attributes:

@@ -1,7 +1,7 @@
 """What an arm does for this panel: each command is a task, so that whatever ends the task ends the motion.
 
-    Works.start --> Work (a task) --> the driver's verb, which stops the arm if it is cancelled
-    Works.end   --> all of them cancelled and joined: the arm was told to stop before this returns
+    ArmTasks.start --> Work (a task) --> the driver's verb, which stops the arm if it is cancelled
+    ArmTasks.end   --> all of them cancelled and joined: the arm was told to stop before this returns
 
 The driver's queue keeps the order in which they were begun. What has the arm for itself (a jog, a following, a drawing,
 something that is played) begins when nothing else is under way, and nothing else begins beside it but what says that it
@@ -18,16 +18,16 @@ from functools import partial
 from typing import Any
 
 from dobot_async._core.util.tasks import cancel_and_join
-from dobot_async.panel.problems import Refusal
+from dobot_async.panel.problems import PanelRefusal
 
-__all__ = ["Work", "Works"]
+__all__ = ["ArmTask", "ArmTasks"]
 
 MOST = 64
 numbers = itertools.count(1)
 
 
 @dataclass(eq=False)
-class Work:
+class ArmTask:
     """One thing that goes on.
 
     Attributes:
@@ -50,7 +50,7 @@ class Work:
     task: asyncio.Task[Any] | None = None
 
 
-class Works:
+class ArmTasks:
     """All that goes on at one arm.
 
     Args:
@@ -59,7 +59,7 @@ class Works:
 
     def __init__(self, changed: Callable[[], None]) -> None:
         self._changed = changed
-        self._going: dict[int, Work] = {}
+        self._going: dict[int, ArmTask] = {}
 
     def __len__(self) -> int:
         return len(self._going)
@@ -87,23 +87,23 @@ class Works:
 
         return found
 
-    def check_room(self, work: Work) -> None:
+    def check_room(self, work: ArmTask) -> None:
         """Raise Refusal if it cannot begin now."""
         if len(self._going) >= MOST:
-            raise Refusal("busy", f"{MOST} commands are under way: wait, or stop the arm")
+            raise PanelRefusal("busy", f"{MOST} commands are under way: wait, or stop the arm")
 
         if work.beside:
             return
 
         other = next((each for each in self._going.values() if each.alone or (work.alone and not each.beside)), None)
         if other:
-            raise Refusal("busy", f"{other.text} is under way: wait until it is done, or stop the arm")
+            raise PanelRefusal("busy", f"{other.text} is under way: wait until it is done, or stop the arm")
 
-    def start(self, work: Work, doing: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
+    def start(self, work: ArmTask, doing: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         """Begin something; raise Refusal, and do nothing, if it cannot begin now."""
         try:
             self.check_room(work)
-        except Refusal:
+        except PanelRefusal:
             doing.close()
             raise
 
@@ -113,7 +113,7 @@ class Works:
         self._changed()
         return work.task
 
-    def get_on(self, work: Work, progress: float | None, seconds_left: float | None = None) -> None:
+    def get_on(self, work: ArmTask, progress: float | None, seconds_left: float | None = None) -> None:
         """Take note of how far something is."""
         work.progress, work.seconds_left = progress, seconds_left
         self._changed()
@@ -129,7 +129,7 @@ class Works:
         tasks = [work.task for work in self._going.values() if work.task]
         await asyncio.gather(*map(cancel_and_join, tasks))
 
-    def _done(self, work: Work, task: asyncio.Task[Any]) -> None:
+    def _done(self, work: ArmTask, task: asyncio.Task[Any]) -> None:
         if not task.cancelled():
             task.exception()  # who waits for it hears of it, and that may be nobody any more
 

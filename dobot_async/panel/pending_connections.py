@@ -20,12 +20,12 @@ from aiohttp.web_protocol import RequestHandler
 
 from dobot_async.bridge.handshake import HANDSHAKE, PENDING
 
-__all__ = ["Doorkeeper"]
+__all__ = ["PendingConnections"]
 
 MOST = 128
 
 
-class Refused(asyncio.Protocol):
+class RefusedConnection(asyncio.Protocol):
     """A connection that is not taken."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -34,7 +34,7 @@ class Refused(asyncio.Protocol):
             transport.abort()
 
 
-class Doorkeeper:
+class PendingConnections:
     """See the module; called for each connection.
 
     Args:
@@ -52,7 +52,7 @@ class Doorkeeper:
         """Somebody has connected."""
         if len(self._server.connections) >= MOST:
             self._refuse("?", "there are too many connections")
-            return Refused()
+            return RefusedConnection()
 
         handler = self._server()
         self._pending[handler] = self._loop.call_later(HANDSHAKE, self._cut, handler, "it has not come in in time")
