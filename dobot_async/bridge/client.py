@@ -22,6 +22,7 @@ from typing import Generic, TypeVar
 from dobot_async._core.link.admission import Admission
 from dobot_async._core.protocol.contract import Frame
 from dobot_async.arms.bridge_adapter import BridgeAdapter, ClientWatch, RequestKind
+from dobot_async.bridge.answers import ClientAnswers
 from dobot_async.bridge.limits import Allowance, Limits
 from dobot_async.bridge.requests import ClientRequest, Refused, RequestHandler
 from dobot_async.errors import DobotError
@@ -94,7 +95,7 @@ class Client(Generic[F]):
         self._writing: asyncio.Task[None] | None = None
         self._unsent: dict[Hashable, ClientRequest[F]] = {}
         self._stopping: set[bytes] = set()
-        self._unanswered: deque[ClientRequest[F]] = deque()
+        self._answers: ClientAnswers[F] = ClientAnswers(in_order=family.in_order, deliver=self.tell)
         self._work = self._loop.create_task(self._run(), name=f"dobot_async bridge {name}")
         self._work.add_done_callback(self._ended)
 
@@ -113,7 +114,7 @@ class Client(Generic[F]):
         self._news.set()
 
     def tell(self, data: bytes) -> None:
-        """Passes on what answers nothing."""
+        """Sends bytes to the client, if it is there."""
         if not self.gone:
             self._deliver(data)
 
@@ -243,9 +244,7 @@ class Client(Generic[F]):
 
     def _take(self, request: ClientRequest[F]) -> None:
         """Begins with a request, or lets it wait."""
-        if self._family.in_order:
-            self._unanswered.append(request)
-
+        self._answers.expect(request)
         if request.ahead:
             self._start(request)
         else:
@@ -286,11 +285,11 @@ class Client(Generic[F]):
             reply = await self._handler.answer(self, request)
         except (Refused, DobotError) as error:
             self._complain(self._family.name(request.frame), str(error))
-            self._answer(request, self._family.refusal(str(error)) if isinstance(error, Refused) else b"")
+            self._answers.give(request, self._family.refusal(str(error)) if isinstance(error, Refused) else b"")
             if self._family.in_order and isinstance(error, DobotError):
                 self._drop()
         else:
-            self._answer(request, b"" if reply is None else bytes(reply))
+            self._answers.give(request, b"" if reply is None else bytes(reply))
         finally:
             self._forget(request)
             if request.ahead:
@@ -298,27 +297,13 @@ class Client(Generic[F]):
             else:
                 self._room.release()
 
-    def _answer(self, request: ClientRequest[F], answer: bytes) -> None:
-        """Tells the client what has become of a request, as soon as it may hear of it."""
-        if not self._family.in_order:
-            for _ in range(request.times if answer and not self.gone else 0):
-                self._deliver(answer)
-
-            return
-
-        request.answer = answer * request.times
-        while self._unanswered and self._unanswered[0].answer is not None:
-            told = self._unanswered.popleft().answer
-            if told and not self.gone:
-                self._deliver(told)
-
     def _drop(self) -> None:
         """Gives up what came behind a request that was not answered: answers to it would pass for that one's."""
         self._inbox.clear()
         self._parser.reset()
         self._unsent.clear()
         while self._waiting:
-            self._answer(self._waiting.popleft(), b"")
+            self._answers.give(self._waiting.popleft(), b"")
 
     def _complain(self, name: str, reason: str) -> None:
         """Tells that a request was not passed on; not of each repetition, for it is asked again and again."""

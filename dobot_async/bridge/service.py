@@ -15,57 +15,28 @@ holder's connection, too: a program whose motion was stopped behind its back mus
 from __future__ import annotations
 
 import asyncio
-import logging
-from collections import Counter
 from collections.abc import Callable, Collection, Coroutine
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, Literal, TypeVar
 
 from dobot_async._core.link.admission import Priority
 from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.contract import Frame, LinkState
-from dobot_async._core.util.events import Events
-from dobot_async._core.util.text import printable
 from dobot_async.arms.bridge_adapter import BridgeAdapter, RequestKind
 from dobot_async.bridge.client import Client
+from dobot_async.bridge.events import BridgeLog
 from dobot_async.bridge.lease import Lease
-from dobot_async.bridge.limits import Allowance, Limits
+from dobot_async.bridge.limits import Limits
 from dobot_async.bridge.line import ArmLink
 from dobot_async.bridge.requests import ClientRequest, Refused
 from dobot_async.bridge.standstill import Standstill
 from dobot_async.errors import ProtocolError, ReplyTimeout
 
-__all__ = ["Bridge", "BridgeEvent"]
+__all__ = ["Bridge"]
 
 F = TypeVar("F", bound=Frame)
-logger = logging.getLogger("dobot_async.bridge")
-TOLD = {"turned away": 0.5, "connected": 1.0, "left": 1.0, "cut": 1.0, "refused": 2.0}
-"""Events a second of a kind that whoever reaches a port can cause; more of them are counted, and not told."""
-BURST = 40
 FAREWELL = 1.5  # seconds: with the closing of the link that is 2, for who is cancelled
-
-
-@dataclass(frozen=True, slots=True)
-class BridgeEvent:
-    """What happened at a bridge, in printable ASCII whatever strangers have said.
-
-    A kind of event that strangers can cause is told 40 times at once, then once or twice a second; the next one says
-    how many were left out.
-
-    Attributes:
-        what: "connected", "left", "turned away", "cut", "refused", "lease", "released", "stopped", "link".
-        client: Whose affair it is, "" if it is nobody's.
-        detail: More of it, in words.
-    """
-
-    what: str
-    client: str
-    detail: str
-
-    def __str__(self) -> str:
-        return ": ".join(filter(None, (self.client, self.what, self.detail)))
 
 
 class Bridge(Generic[F]):
@@ -93,7 +64,8 @@ class Bridge(Generic[F]):
         self.urls: tuple[str, ...] = ()
         self.token: str | None = None
         self.link = link
-        self.events: Events[BridgeEvent] = Events()
+        self._log = BridgeLog()
+        self.events = self._log.events
         self.stops = 0
         self.family = family
         self._denied = denied
@@ -104,9 +76,6 @@ class Bridge(Generic[F]):
         leave = Standstill(self._line, family, self._tell).reach if on_vanish == "stop" else let_finish
         self._lease = Lease(takeover=takeover, leave=leave, cut=self.cut, tell=self._tell)
         self._farewells: set[asyncio.Task[None]] = set()
-        now = asyncio.get_running_loop().time
-        self._bounds = {what: Allowance(rate, now, most=BURST) for what, rate in TOLD.items()}
-        self._left_out: Counter[str] = Counter()
         link.on_unsolicited.add(self._unasked)
         self._watching = asyncio.create_task(self._watch_link(), name="dobot_async bridge link")
 
@@ -310,21 +279,8 @@ class Bridge(Generic[F]):
             self._tell("link", "", words.get(state, state.value))
 
     def _tell(self, what: str, client: Client[F] | str, detail: str = "") -> None:
-        """Tells what has happened; of what strangers can cause at will only so much, and how much was left out."""
-        bound = self._bounds.get(what)
-        if bound and bound.wait:
-            self._left_out[what] += 1
-            return
-
-        if bound:
-            bound.spend(1)
-            left_out = self._left_out.pop(what, 0)
-            detail = f"{detail} (and {left_out} more that are not told one by one)" if left_out else detail
-
-        name = client if isinstance(client, str) else client.name
-        event = BridgeEvent(what, printable(name), printable(detail))
-        self.events.publish(event)
-        logger.info("%s", event)
+        """Tells what has happened."""
+        self._log.tell(what, client if isinstance(client, str) else client.name, detail)
 
 
 async def let_finish(_: object) -> None:

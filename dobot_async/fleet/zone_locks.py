@@ -273,10 +273,8 @@ class ZoneLocks:
                     failed = f"{holder.name} has failed, and may still be in zone {zone}: {holder.failure}"
                     yield request, ZoneOccupied(failed)
                 elif not holder.moving() and request.parked(holder):
-                    yield (
-                        request,
-                        ZoneOccupied(f"{holder.name} is in zone {zone}, and no program is left that moves it"),
-                    )
+                    parked = f"{holder.name} is in zone {zone}, and no program is left that moves it"
+                    yield request, ZoneOccupied(parked)
 
             cycle = self._cycle(request) if request.patient else []
             if cycle:

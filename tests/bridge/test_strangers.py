@@ -272,7 +272,7 @@ async def test_a_token_may_be_long(listen: str) -> None:
 async def test_what_strangers_cause_is_told_a_few_times_and_then_counted() -> None:
     async with bridged(token=TOKEN) as rig:
         now = 0.0
-        rig.bridge._bounds["turned away"] = Allowance(0.5, lambda: now, most=40)
+        rig.bridge._log._rates["turned away"] = Allowance(0.5, lambda: now, most=40)
         for _ in range(1000):
             rig.bridge.turned_away("tcp://127.0.0.1:1", "a wrong token")
 

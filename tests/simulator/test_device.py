@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dobot_async.simulator.device.device import Activity, Device, DeviceFault, DeviceOptions, Executed, Vector, Work
+from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.device.path import joint_segment, travel
 from dobot_async.simulator.device.profile import SpeedLimits
+from dobot_async.simulator.device.work import Activity, DeviceFault, DeviceOptions, Executed, Vector, Work
 
 PACE = SpeedLimits((100.0, 100.0), (200.0, 200.0))
 LITE = DeviceOptions(on_fault="continue")

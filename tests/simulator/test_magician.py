@@ -18,7 +18,7 @@ from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import IGNORED
 from dobot_async.arms.magician.frame import MAX_PARAMS, QUEUED, WRITE, Frame, Parser, encode, request
 from dobot_async.arms.magician.kinematics import JointLimits, Kinematics, Unreachable
-from dobot_async.simulator.device.device import DeviceOptions
+from dobot_async.simulator.device.work import DeviceOptions
 from dobot_async.simulator.magician.arm import MAGICIAN, MagicianSession, Quirks, SimulatedMagician
 from dobot_async.simulator.magician.jog import margins
 

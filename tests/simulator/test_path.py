@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from dobot_async.arms.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.simulator.device.curve import Arc, LineSegment, arc, circle
-from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Vector, Work
+from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.device.path import Segment, curve_segment, joint_segment, jump, travel
 from dobot_async.simulator.device.profile import Profile, SpeedLimits, shared, trapezoid
+from dobot_async.simulator.device.work import Activity, DeviceFault, Vector, Work
 
 JOINTS = SpeedLimits((200.0,) * 4, (400.0,) * 4)
 TOOL = SpeedLimits((100.0, 200.0), (400.0, 800.0))

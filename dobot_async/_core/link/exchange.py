@@ -143,8 +143,7 @@ class Exchange(Connection, Generic[F]):
                 if self._correlator.newest(frame.key):
                     await self._clear(frame.key, deadline)
 
-                left = self._left(deadline)
-                if not left:
+                if not (left := self._left(deadline)):
                     break
 
                 ready()

@@ -16,26 +16,13 @@ from typing import Protocol
 from dobot_async.simulator.device.timeline import Timeline
 from dobot_async.simulator.device.work import (
     NO_INDEX,
-    Activity,
-    DeviceFault,
     DeviceOptions,
     Executed,
-    Outcome,
     Vector,
     Work,
 )
 
-__all__ = [
-    "Activity",
-    "Device",
-    "DeviceFault",
-    "DeviceOptions",
-    "Executed",
-    "Outcome",
-    "Surroundings",
-    "Vector",
-    "Work",
-]
+__all__ = ["Device", "Surroundings"]
 
 
 class Surroundings(Protocol):

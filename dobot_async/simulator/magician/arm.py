@@ -22,7 +22,7 @@ from dobot_async.arms.magician.alarms import encode as encode_alarms
 from dobot_async.arms.magician.frame import WRITE, Frame, Parser, encode
 from dobot_async.arms.magician.kinematics import JointLimits
 from dobot_async.errors import ProtocolError
-from dobot_async.simulator.device.device import DeviceOptions, Work
+from dobot_async.simulator.device.work import DeviceOptions, Work
 from dobot_async.simulator.magician.body import MAGICIAN, MagicianBody, StoredProgram
 from dobot_async.simulator.magician.state import REACH
 

@@ -13,7 +13,8 @@ from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import IGNORED, SIZE, Alarm, lookup
 from dobot_async.arms.magician.kinematics import JointLimits
-from dobot_async.simulator.device.device import Device, DeviceFault, DeviceOptions, Executed, Work
+from dobot_async.simulator.device.device import Device
+from dobot_async.simulator.device.work import DeviceFault, DeviceOptions, Executed, Work
 from dobot_async.simulator.magician.effects import CommandEffects, read_pin
 from dobot_async.simulator.magician.state import HOME_JOINTS, Motor, State
 

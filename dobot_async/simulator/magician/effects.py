@@ -12,7 +12,8 @@ from typing import Any
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.magician import commands as c
-from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Executed, Work
+from dobot_async.simulator.device.device import Device
+from dobot_async.simulator.device.work import Activity, DeviceFault, Executed, Work
 from dobot_async.simulator.magician.jog import jog, margins
 from dobot_async.simulator.magician.motion import Motions
 from dobot_async.simulator.magician.state import State

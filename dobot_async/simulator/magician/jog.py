@@ -12,9 +12,9 @@ from dataclasses import replace
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.kinematics import JointLimits
 from dobot_async.simulator.device.curve import LineSegment
-from dobot_async.simulator.device.device import Activity, DeviceFault, Vector
 from dobot_async.simulator.device.path import Segment, curve_segment, joint_segment
 from dobot_async.simulator.device.profile import SpeedLimits, trapezoid
+from dobot_async.simulator.device.work import Activity, DeviceFault, Vector
 from dobot_async.simulator.magician.motion import RAIL, along, clipped, standing
 from dobot_async.simulator.magician.reach import Reach
 from dobot_async.simulator.magician.state import State

@@ -12,9 +12,10 @@ from functools import partial
 
 from dobot_async.arms.magician import commands as c
 from dobot_async.simulator.device.curve import LineSegment, arc, between, circle
-from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Vector
+from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.device.path import Segment, curve_segment, joint_segment, jump, travel
 from dobot_async.simulator.device.profile import SpeedLimits, trapezoid
+from dobot_async.simulator.device.work import Activity, DeviceFault, Vector
 from dobot_async.simulator.magician.reach import Reach
 from dobot_async.simulator.magician.state import HOME_JOINTS, HOME_POINT, State
 

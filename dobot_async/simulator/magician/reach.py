@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dobot_async.arms.magician.kinematics import Kinematics, Unreachable
-from dobot_async.simulator.device.device import DeviceFault, Vector
+from dobot_async.simulator.device.work import DeviceFault, Vector
 
 __all__ = ["Reach"]
 

@@ -21,7 +21,7 @@ from dobot_async.arms.mycobot.frame import MAX_LENGTH, Frame, Parser, encode
 from dobot_async.arms.mycobot.layouts import ACK
 from dobot_async.arms.mycobot.models import FAMILY, MODELS, model_of
 from dobot_async.errors import ProtocolError
-from dobot_async.simulator.device.device import DeviceOptions
+from dobot_async.simulator.device.work import DeviceOptions
 from dobot_async.simulator.mycobot.body import HEAT, VOLTAGE, MyCobotBody
 from dobot_async.simulator.mycobot.numbers import has
 

@@ -12,9 +12,9 @@ from typing import Any
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.mycobot import commands as c
 from dobot_async.arms.mycobot.models import SENTINEL, CobotModel
-from dobot_async.simulator.device.device import Device, DeviceFault, DeviceOptions, Executed, Work
+from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.device.path import Segment, travel
-from dobot_async.simulator.device.work import Vector
+from dobot_async.simulator.device.work import DeviceFault, DeviceOptions, Executed, Vector, Work
 from dobot_async.simulator.mycobot.elbow import elbow_angle
 from dobot_async.simulator.mycobot.gripper import SimulatedGripper
 from dobot_async.simulator.mycobot.kinematics import Chain, Palletizer, Transform

@@ -41,6 +41,16 @@ class Scene:
 
     `simulate(..., scene=scene, mount=Mount(...))` puts an arm into it. Arms of one scene share the clock, and so the
     speed, of the first one. Once all have left, others can come, and find everything where it was left.
+
+    Args:
+        pieces: What can be picked up. They are put down one after the other, so that one can stand on another.
+        blocks: What stands where it is.
+        belts: Conveyor belts.
+        sensors: Light beams and colour sensors.
+        table: How high the table is, mm; by default where it is seen from a Magician that stands on it.
+
+    Raises:
+        ValueError: Two things have one name, or the table is nowhere.
     """
 
     def __init__(
@@ -52,18 +62,6 @@ class Scene:
         sensors: Iterable[LightBeam | ColorSpot] = (),
         table: float = -138.0,
     ) -> None:
-        """Builds a scene without arms.
-
-        Args:
-            pieces: What can be picked up. They are put down one after the other, so that one can stand on another.
-            blocks: What stands where it is.
-            belts: Conveyor belts.
-            sensors: Light beams and colour sensors.
-            table: How high the table is, mm; by default where it is seen from a Magician that stands on it.
-
-        Raises:
-            ValueError: Two things have one name, or the table is nowhere.
-        """
         if not math.isfinite(table):
             raise ValueError(f"table is a finite height in mm, not {table!r}")
 
@@ -288,8 +286,7 @@ class Scene:
     def _draw(self, tip: Place3, stroke: list[Place3] | None) -> list[Place3]:
         """Draws on from a stroke, or begins another one."""
         if stroke is None:
-            stroke = []
-            self._strokes.append(stroke)
+            self._strokes.append(stroke := [])
 
         if not stroke or math.dist(stroke[-1], tip) > SAME_POINT:
             stroke.append(tip)

@@ -17,7 +17,8 @@ from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.frame import split_words
 from dobot_async.errors import ProtocolError
-from dobot_async.simulator.device.device import Device, DeviceOptions, Executed
+from dobot_async.simulator.device.device import Device
+from dobot_async.simulator.device.work import DeviceOptions, Executed
 from dobot_async.simulator.ultraarm.body import CommandEffects, Registers, plus, pose
 from dobot_async.simulator.ultraarm.kinematics import forward
 

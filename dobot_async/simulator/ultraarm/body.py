@@ -10,9 +10,10 @@ from typing import Any
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.simulator.device.curve import LineSegment, between
-from dobot_async.simulator.device.device import Activity, Device, DeviceFault, Vector, Work
+from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.device.path import Segment, curve_segment, joint_segment, travel
 from dobot_async.simulator.device.profile import SpeedLimits, trapezoid
+from dobot_async.simulator.device.work import Activity, DeviceFault, Vector, Work
 from dobot_async.simulator.ultraarm.kinematics import REACH, checked, forward, inverse
 
 __all__ = ["CommandEffects", "Registers"]

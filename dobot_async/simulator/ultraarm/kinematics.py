@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from dobot_async.arms.ultraarm import commands as c
-from dobot_async.simulator.device.device import DeviceFault, Vector
+from dobot_async.simulator.device.work import DeviceFault, Vector
 
 __all__ = ["LIMIT", "OUT_OF_REACH", "REACH", "checked", "forward", "inverse"]
 
