@@ -4,8 +4,8 @@
 - When it may end in a moment: for the index alone, as fast as it is answered. An answer to anything else would come
   between the end and the answer that tells of it.
 - Where nothing tells when it ends: for the index, at intervals of 2 % of what the motion has taken so far.
-- One question at a time, and where an answer takes long, all of this less often: so that what is asked beside the end is
-  a small part of what the link can answer.
+- One question at a time, and where an answer takes long, all of this less often: what is asked for anything but the end
+  is a small part of what the link can answer.
 """
 
 from __future__ import annotations
