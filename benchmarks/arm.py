@@ -1,6 +1,6 @@
 """Simulated arms in a process of their own, so that they take neither time nor memory from who is measured.
 
-    python benchmarks/arm.py '{"listen": "pty:?baud=115200", "speed": 1.0}'
+    python -m benchmarks.arm '{"listen": "pty:?baud=115200", "speed": 1.0}'
 
 The first line that it prints is a JSON list of URLs. Then each line that it reads is a question, answered with a line
 of JSON: `counters`, and `executed`: [name, started, finished] of each command that took its time, in seconds of
@@ -26,8 +26,7 @@ from contextlib import AsyncExitStack, ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from report import BAUD, BITS
-
+from benchmarks.report import BAUD, BITS
 from dobot_async.endpoints.line_rate import RateLimited, Wired
 from dobot_async.endpoints.pty import on_pty
 from dobot_async.mycobot import commands as cobot
@@ -169,7 +168,7 @@ def arms(
 ) -> Iterator[Arms]:
     """Runs simulated arms for the length of a block; with `hears` behind lines of 115200 baud, whatever `listen` is."""
     details = json.dumps({"listen": listen, "model": model, "speed": speed, "count": count, "hears": hears.hex()})
-    command = [sys.executable, __file__, details]
+    command = [sys.executable, "-m", "benchmarks.arm", details]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         try:
             yield Arms(process)

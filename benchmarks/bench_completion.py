@@ -1,6 +1,6 @@
 """How late the end of a motion is noticed, from the arm's finishing to the return of the await, and what waiting costs.
 
-    python benchmarks/bench_completion.py [--motions 50] [--json] [--quick]
+    python -m benchmarks.bench_completion [--motions 50] [--json] [--quick]
 
 Each client moves the arm back and forth over ways of different lengths, and waits for the end of each. The minimal
 client does nothing but ask for the current index, as fast as it is answered; the others do what they do.
@@ -12,11 +12,9 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable
 
-import minimal
-import others
-from arm import Clock, arms
-from report import BAUD, Row, parsed, percentile, show
-
+from benchmarks import minimal, others
+from benchmarks.arm import Clock, arms
+from benchmarks.report import BAUD, Row, parsed, percentile, show
 from dobot_async import Magician, PTPMode
 from dobot_async.magician import commands as c
 from dobot_async.simulator import simulate

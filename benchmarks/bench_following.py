@@ -1,6 +1,6 @@
 """How far arms are behind a target that moves: a circle of 60 mm, in two seconds round, over a line of 115,200 baud.
 
-    python benchmarks/bench_following.py [--rounds 10] [--json] [--quick] [--plot FILE]
+    python -m benchmarks.bench_following [--rounds 10] [--json] [--quick] [--plot FILE]
 
 In virtual time: the line carries its bytes and loses nothing, and neither program takes time of its own, so that the
 figures are the same in every run. `lag` is how long ago the target was where the arm is now, on the circle; `off_mm` is
@@ -11,16 +11,15 @@ from __future__ import annotations
 
 import asyncio
 import math
-import sys
 from argparse import ArgumentParser
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import async_solipsism
-import bench_lateness
-from report import Row, percentile, show
 
+import benchmarks.slow_line  # noqa: F401 - it adds its scheme
+from benchmarks.report import Row, percentile, show
 from dobot_async import Magician, MyCobot, UltraArm
 from dobot_async.simulator import UltraArmQuirks, simulate
 
@@ -183,7 +182,6 @@ def main() -> None:
     options.add_argument("--plot", type=Path)
     chosen = options.parse_args()
     rounds = 3 if chosen.quick else chosen.rounds
-    sys.modules[bench_lateness.__name__] = bench_lateness  # where the scheme is looked for
     rows: list[Row] = []
     circles: dict[str, Circle] = {}
     for name, kind in KINDS.items():

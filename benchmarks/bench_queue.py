@@ -1,6 +1,6 @@
 """Queued PTP motions a second, for 1, 4, 8 and 16 unacknowledged at a time; the arm executes each at once.
 
-    python benchmarks/bench_queue.py [--commands 2000] [--json] [--quick]
+    python -m benchmarks.bench_queue [--commands 2000] [--json] [--quick]
 
 The limit at 115200 baud is that of 23 bytes out and 14 back: one after the other with a window of 1, side by side with
 more. `ratio` is beside the minimal client with the same window, which never asks how much room the queue has. The
@@ -15,11 +15,9 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 
-import minimal
-import others
-from arm import AT_ONCE, arms
-from report import BAUD, BITS, Row, parsed, show
-
+from benchmarks import minimal, others
+from benchmarks.arm import AT_ONCE, arms
+from benchmarks.report import BAUD, BITS, Row, parsed, show
 from dobot_async import Magician
 from dobot_async.simulator import simulate
 

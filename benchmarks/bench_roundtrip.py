@@ -1,6 +1,6 @@
 """Poses read one at a time: how many a second, what is added to the line's own time, and CPU per 1,000 requests.
 
-    python benchmarks/bench_roundtrip.py [--requests 2000] [--json] [--quick]
+    python -m benchmarks.bench_roundtrip [--requests 2000] [--json] [--quick]
 
 Over memory (where the simulated arm takes its time in the same process), over a pseudo-terminal as fast as the
 computer, and over one at 115200 baud, the arm being in another process. The limit is what the baud rate allows: 6 bytes
@@ -15,11 +15,9 @@ import time
 from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
 
-import minimal
-import others
-from arm import Arms, arms
-from report import BAUD, BITS, Row, parsed, percentile, show
-
+from benchmarks import minimal, others
+from benchmarks.arm import Arms, arms
+from benchmarks.report import BAUD, BITS, Row, parsed, percentile, show
 from dobot_async import Magician
 from dobot_async.simulator import simulate
 

@@ -21,7 +21,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from report import Row, clients, text
+from benchmarks.report import Row, clients, text
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "RESULTS.md"

@@ -14,6 +14,7 @@ __all__ = ["LEAST", "Budget", "check_budget"]
 
 LEAST = 5.0  # requests per second; with fewer an arm could not be watched, and hardly connected to
 BURST = 0.1  # seconds: the turns of so long may be taken at once
+TICK = 1e-6  # seconds that count as none
 DEBT = 1.0  # seconds for which others wait, at the most, because of what could not wait
 
 
@@ -43,7 +44,7 @@ class Budget:
         async with self._turn:
             while True:
                 wait = self._spent_until - self._loop.time() - BURST
-                if wait <= 0:
+                if wait < TICK:
                     break
 
                 await asyncio.sleep(wait)
