@@ -165,7 +165,6 @@ async def test_a_motion_of_three_seconds_takes_sixty_requests_at_the_most(mode: 
 async def test_on_a_slow_link_nothing_waits_behind_what_was_asked_before(model: str, delay: float) -> None:
     kind, details = FAMILIES[model]
     loop, rng = asyncio.get_running_loop(), random.Random(1)
-    began = loop.time()
     async with simulate(model, **details) as sim:
         heard = Heard(sim)
         url = sim.url.replace("sim://", "slow://") + f"?delay={delay}"
@@ -174,7 +173,6 @@ async def test_on_a_slow_link_nothing_waits_behind_what_was_asked_before(model: 
             if kind is MyCobot:
                 await arm.power_on()
 
-            late: list[float] = []
             out, most = 0, 0
 
             def count(outgoing: bool, _: object) -> None:
@@ -186,13 +184,26 @@ async def test_on_a_slow_link_nothing_waits_behind_what_was_asked_before(model: 
             before, started = len(heard.times), loop.time()
             for _ in range(10):
                 await arm.move_joints(*(rng.uniform(5, 40) for _ in range(JOINTS[model])))
-                late.append(loop.time() - began - sim.arm.executed[-1].finished)
 
             assert most <= 2
             assert len(heard.times) - before <= (loop.time() - started) / (2 * delay) + 10
-            if kind is Magician:  # a question that was on its way, the index, and the alarms behind it
-                assert sorted(late)[5] < 4 * 2 * delay
-                assert max(late) < 5.5 * 2 * delay
+
+
+@pytest.mark.parametrize("delay", [0.025, 0.05, 0.1])
+@virtual
+async def test_the_end_is_noticed_two_round_trips_after_it_however_long_they_are(delay: float) -> None:
+    """At the median: half of one until the next question, half of one for its answer, and one for the alarms."""
+    loop, rng = asyncio.get_running_loop(), random.Random(1)
+    began, late = loop.time(), list[float]()
+    async with simulate(homed=True) as sim:
+        async with Magician.connect(sim.url.replace("sim://", "slow://") + f"?delay={delay}") as arm:
+            for number in range(20):
+                x, y = 200 + rng.uniform(0, 40), rng.uniform(60, 120) * (-1) ** number
+                await arm.move_to(x, y, 40, mode=PTPMode.MOVL_XYZ)
+                late.append(loop.time() - began - sim.arm.executed[-1].finished)
+
+    assert sorted(late)[10] < 2.4 * 2 * delay
+    assert max(late) < 5 * 2 * delay
 
 
 @virtual

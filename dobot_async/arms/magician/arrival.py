@@ -21,7 +21,7 @@ __all__ = ["Approach"]
 
 LOOK = 0.006  # seconds that a look may take: one that is not over before the end would come between it and its news
 LONGER = 1.5  # times what the last look took, where that is more
-NEAR = 3  # times as long before the end, from when on no other look is worth it
+NEAR = 0.018  # seconds before the end, or those of two looks: from then on no other look is worth it
 EARLY = 0.003  # seconds before a look is due, from when on it is not worth waiting for
 AGAIN = 0.1  # seconds after which an arm that should have arrived is looked at once more
 STANDING = 0.02  # seconds between two looks at an arm that has not set off
@@ -88,7 +88,8 @@ class Approach:
             else:
                 gone = self._left - left
                 least = left * (now - self._looked_at) / gone if gone > STEP else 0.0
-                again_at = now + least + (AGAIN if least < NEAR * self._margin else -self._margin)
+                near = least < max(NEAR, 2 * self._margin)
+                again_at = now + (2 * least + max(AGAIN, 2 * self._margin) if near else least - self._margin)
 
             self._until, self._again_at = now + least, again_at
             if across:
