@@ -19,6 +19,7 @@ from typing import Any
 import async_solipsism
 
 import benchmarks.slow_line  # noqa: F401 - it adds its scheme
+from benchmarks import svg
 from benchmarks.report import Row, percentile, show
 from dobot_async import Magician, MyCobot, UltraArm
 from dobot_async.simulator import UltraArmQuirks, simulate
@@ -158,19 +159,9 @@ async def measured(kind: Kind, rounds: int) -> tuple[Row, Circle]:
 
 def plot(circles: dict[str, Circle], file: Path) -> None:
     """Draw the lags over the time."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - only for a plot
-
-    figure = Figure(figsize=(8, 4.5), layout="constrained")
-    axes = figure.subplots()
-    for name, circle in circles.items():
-        axes.plot([number / RATE for number in range(len(circle.lags))], circle.lags, label=name, linewidth=1)
-
-    axes.set(
-        xlabel="s", ylabel="lag, s", yscale="log", title="Behind a target on a circle of 60 mm, 0.5 Hz, 115200 baud"
-    )
-    axes.legend(fontsize="small", ncols=2)
-    axes.grid(visible=True, alpha=0.3)
-    figure.savefig(file, dpi=110)
+    curves = {name: [(number / RATE, lag) for number, lag in enumerate(each.lags)] for name, each in circles.items()}
+    label = "s behind a target on a circle of 60 mm, 0.5 Hz, 115200 baud"
+    file.write_text(svg.lines(label, "s", curves, log=True), encoding="utf-8")
 
 
 def main() -> None:

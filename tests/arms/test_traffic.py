@@ -109,14 +109,14 @@ async def test_a_stop_does_not_wait_for_a_turn(model: str) -> None:
             await arm.power_on()
 
         moving = asyncio.create_task(arm.move_joints(*[40.0] * JOINTS[model]))
-        while not sim.arm.device.moving:
+        while not sim.arm.device.moving:  # noqa: ASYNC110 - it has no event
             await asyncio.sleep(0.001)
 
         askers = [asyncio.create_task(ask_for_ever(arm)) for _ in range(50)]  # ten seconds of turns
         await asyncio.sleep(0.01)
         began = loop.time()
         stopping = asyncio.create_task(arm.stop())
-        while sim.arm.device.moving:
+        while sim.arm.device.moving:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
 
         assert loop.time() - began < 1.0
@@ -195,12 +195,12 @@ async def test_the_end_is_noticed_two_round_trips_after_it_however_long_they_are
     """At the median: half of one until the next question, half of one for its answer, and one for the alarms."""
     loop, rng = asyncio.get_running_loop(), random.Random(1)
     began, late = loop.time(), list[float]()
-    async with simulate(homed=True) as sim:
-        async with Magician.connect(sim.url.replace("sim://", "slow://") + f"?delay={delay}") as arm:
-            for number in range(20):
-                x, y = 200 + rng.uniform(0, 40), rng.uniform(60, 120) * (-1) ** number
-                await arm.move_to(x, y, 40, mode=PTPMode.MOVL_XYZ)
-                late.append(loop.time() - began - sim.arm.executed[-1].finished)
+    line = lambda url: url.replace("sim://", "slow://") + f"?delay={delay}"  # noqa: E731
+    async with simulate(homed=True) as sim, Magician.connect(line(sim.url)) as arm:
+        for number in range(20):
+            x, y = 200 + rng.uniform(0, 40), rng.uniform(60, 120) * (-1) ** number
+            await arm.move_to(x, y, 40, mode=PTPMode.MOVL_XYZ)
+            late.append(loop.time() - began - sim.arm.executed[-1].finished)
 
     assert sorted(late)[10] < 2.4 * 2 * delay
     assert max(late) < 5 * 2 * delay
