@@ -97,8 +97,8 @@ def on_line(link: str, listen: str, motions: int) -> list[Row]:
 
     if link == "115200 baud":
         with arms(listen, speed=SPEED, loss=LOSS) as there:
-            measure = asyncio.run(by_driver(there.url, max(motions // 2, 2)))
-            rows.append(row_of(f"{link}, 1 % lost", "dobot_async", measure, there.ended(PTP)))
+            found = asyncio.run(by_driver(there.url, max(motions // 2, 2)))
+            rows.append(row_of(f"{link}, 1 % lost", "dobot_async", found, there.ended(PTP)))
 
     for name in others.available():
         with arms(listen, speed=SPEED) as there:

@@ -57,9 +57,9 @@ def test_all_are_known_to_the_command() -> None:
 def test_what_was_found_is_written_down_quoted_and_drawn(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("Before.\n<!-- figures: lateness -->\nold\n<!-- end of figures -->\nBehind.\n")
-    command = [sys.executable, "-m", "benchmarks", "parser", "lateness", "--quick", "--docs", tmp_path]
+    command = [sys.executable, "-m", "benchmarks", "parser", "lateness", "--quick", "--docs", str(tmp_path)]
     subprocess.run(
-        [*command, "--results", tmp_path / "RESULTS.md"],
+        [*command, "--results", str(tmp_path / "RESULTS.md")],
         check=True,
         cwd=BENCHMARKS.parent,
         timeout=100,

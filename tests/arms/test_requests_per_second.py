@@ -51,6 +51,11 @@ class Heard:
         return max(sum(1 for each in self.times if begin <= each < begin + seconds) for begin in self.times)
 
 
+def slow(url: str, delay: float = 0.0) -> str:
+    """The same arm at the end of a line of 115200 baud."""
+    return f"{url.replace('sim://', 'slow://')}?delay={delay}"
+
+
 async def ask_for_ever(arm: Any) -> None:
     while True:
         await arm.get_joints()
@@ -147,7 +152,7 @@ def test_what_is_no_number_is_told() -> None:
 async def test_a_motion_of_three_seconds_takes_sixty_requests_at_the_most(mode: PTPMode) -> None:
     async with simulate(homed=True) as sim:
         heard = Heard(sim)
-        async with Magician.connect(sim.url.replace("sim://", "slow://")) as arm:
+        async with Magician.connect(slow(sim.url)) as arm:
             await arm.move_to(200, -100, 40)
             await arm.set_speed(50 if mode is PTPMode.MOVL_XYZ else 15)
             before = len(heard.times)
@@ -167,9 +172,8 @@ async def test_on_a_slow_link_nothing_waits_behind_what_was_asked_before(model: 
     loop, rng = asyncio.get_running_loop(), random.Random(1)
     async with simulate(model, **details) as sim:
         heard = Heard(sim)
-        url = sim.url.replace("sim://", "slow://") + f"?delay={delay}"
         options = {"reply_timeout": 1.0} if kind is not Magician else {}
-        async with kind.connect(url, **options) as arm:
+        async with kind.connect(slow(sim.url, delay), **options) as arm:
             if kind is MyCobot:
                 await arm.power_on()
 
@@ -195,8 +199,7 @@ async def test_the_end_is_noticed_two_round_trips_after_it_however_long_they_are
     """At the median: half of one until the next question, half of one for its answer, and one for the alarms."""
     loop, rng = asyncio.get_running_loop(), random.Random(1)
     began, late = loop.time(), list[float]()
-    line = lambda url: url.replace("sim://", "slow://") + f"?delay={delay}"  # noqa: E731
-    async with simulate(homed=True) as sim, Magician.connect(line(sim.url)) as arm:
+    async with simulate(homed=True) as sim, Magician.connect(slow(sim.url, delay)) as arm:
         for number in range(20):
             x, y = 200 + rng.uniform(0, 40), rng.uniform(60, 120) * (-1) ** number
             await arm.move_to(x, y, 40, mode=PTPMode.MOVL_XYZ)
