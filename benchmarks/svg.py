@@ -10,7 +10,7 @@ from itertools import count
 __all__ = ["bars", "lines"]
 
 WIDTH, HEIGHT = 720, 340
-LEFT, RIGHT, TOP, BOTTOM = 64, 16, 44, 40
+LEFT, RIGHT, TOP, BOTTOM = 64, 16, 66, 40
 COLORS = ("#8a8a8a", "#1f6fb4", "#d1852c", "#6b9b37", "#8e5ba6", "#b5443c", "#3a9a9a")
 INK = "#555"
 
@@ -64,11 +64,16 @@ def frame(scale: Scale, label: str, names: Sequence[str]) -> list[str]:
         parts.append(f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}" stroke="{INK}" opacity=".2"/>')
         parts.append(text(LEFT - 6, y + 4, f"{tick:g}", "end"))
 
-    x = float(LEFT)
+    x, y = float(LEFT), 34
     for name, number in zip(names, count(), strict=False):
-        parts.append(f'<rect x="{x:.0f}" y="25" width="10" height="10" fill="{COLORS[number % len(COLORS)]}"/>')
-        parts.append(text(x + 14, 34, name, "start"))
-        x += 26 + 6.2 * len(name)
+        width = 26 + 6.2 * len(name)
+        if x + width > WIDTH:
+            x, y = float(LEFT), y + 15
+
+        color = COLORS[number % len(COLORS)]
+        parts.append(f'<rect x="{x:.0f}" y="{y - 9}" width="10" height="10" fill="{color}"/>')
+        parts.append(text(x + 14, y, name, "start"))
+        x += width
 
     return parts
 
