@@ -44,7 +44,7 @@ class Approach:
         self._look = look
         self._clock = clock
         self._entry: Entry | None = None
-        self._across = False
+        self._across: bool = False
         self._margin = LOOK
         self._target = Destination((0.0, 0.0, 0.0, 0.0))
         self._began_at: float | None = None
@@ -69,7 +69,7 @@ class Approach:
                 self._target = destination(entry.value) or increased(pose, entry.value)
 
             self._margin = max(LOOK, LONGER * (self._clock() - now))
-            across = distance_across(entry.value, pose)
+            across: float = distance_across(entry.value, pose)
             self._estimate(entry, across or self._target.distance(pose), now, across=across > 0)
 
         return None if self._until is None else max(0.0, min(self._until, self._again_at) - self._clock())
