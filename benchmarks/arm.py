@@ -1,12 +1,14 @@
 """Simulated arms in a process of their own, so that they take neither time nor memory from who is measured.
 
-    python benchmarks/arm.py '{"listen": "pty:?baud=115200", "speed": 1.0}'
+    python -m benchmarks.arm '{"listen": "pty:?baud=115200", "speed": 1.0}'
 
 The first line that it prints is a JSON list of URLs. Then each line that it reads is a question, answered with a line
 of JSON: `counters`, and `executed`: [name, started, finished] of each command that took its time, in seconds of
 `time.monotonic`, which on one computer is the same in all processes; `each` is `executed` of every arm, and `heard`
 tells of every arm when the bytes that the argument `hears` names had come to its end of the line. It ends with its
 input.
+
+Where there are several processors, who is measured has the first one to itself, and the arms have the others.
 
 Its loop waits with `select`, whose timers are exact to some hundredth of a millisecond where epoll's are to a whole
 one: the lines of the arms are as slow as they should be, and not slower.
@@ -26,17 +28,19 @@ from contextlib import AsyncExitStack, ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from report import BAUD, BITS
-
+from benchmarks.report import BAUD, BITS
 from dobot_async.endpoints.line_rate import RateLimited, RateLimitedPeer
 from dobot_async.endpoints.pty import on_pty
 from dobot_async.mycobot import commands as cobot
-from dobot_async.simulator import MyCobotQuirks, Simulation, simulate
+from dobot_async.simulator import Faults, MyCobotQuirks, Simulation, simulate
 
 __all__ = ["AT_ONCE", "Arms", "Clock", "arms", "crowd"]
 
+CORES = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+"""The processors that this process had when it began."""
 AT_ONCE = 1e6
 """The speed of an arm that executes at once."""
+SEED = 1
 QUIRKS: dict[str, dict[str, Any]] = {
     "myarm300": {"quirks": MyCobotQuirks(acknowledges=frozenset({cobot.SEND_ANGLES}), echo=False, transponder=False)},
     "ultraarm": {"homed": True},
@@ -165,17 +169,40 @@ class Listener:
 
 @contextmanager
 def arms(
-    listen: str, *, model: str = "magician", speed: float = 1.0, count: int = 1, hears: bytes = b""
+    listen: str,
+    *,
+    model: str = "magician",
+    speed: float = 1.0,
+    count: int = 1,
+    loss: float = 0.0,
+    hears: bytes = b"",
 ) -> Iterator[Arms]:
     """Runs simulated arms for the length of a block; with `hears` behind lines of 115200 baud, whatever `listen` is."""
-    details = json.dumps({"listen": listen, "model": model, "speed": speed, "count": count, "hears": hears.hex()})
-    command = [sys.executable, __file__, details]
+    told = {"listen": listen, "model": model, "speed": speed, "count": count, "loss": loss, "hears": hears.hex()}
+    details = json.dumps(told | {"cores": CORES[1:]})
+    command = [sys.executable, "-m", "benchmarks.arm", details]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         try:
-            yield Arms(process)
+            with alone():
+                yield Arms(process)
         finally:
             assert process.stdin
             process.stdin.close()
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """While this is entered, this process has a processor to itself, where there are several."""
+    if len(CORES) < 2:
+        yield
+        return
+
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, CORES[:1])
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
 
 
 @dataclass
@@ -213,7 +240,7 @@ class Clock:
         return time.monotonic() * self.speed
 
 
-async def serve(selector: Woken, *, listen: str, model: str, speed: float, count: int, hears: str) -> None:
+async def serve(selector: Woken, *, listen: str, model: str, speed: float, count: int, loss: float, hears: str) -> None:
     """Runs the arms until the input ends."""
     loop = asyncio.get_running_loop()
     async with AsyncExitStack() as stack:
@@ -223,6 +250,8 @@ async def serve(selector: Woken, *, listen: str, model: str, speed: float, count
                     model,
                     listen="memory" if hears else listen,
                     clock=Clock(speed),
+                    faults=Faults(loss=loss),
+                    seed=SEED,
                     **QUIRKS.get(model, {}),
                 )
             )
@@ -273,9 +302,13 @@ ANSWERS = {"counters": counters, "executed": executed, "each": each, "heard": he
 
 def main() -> None:
     """Runs what the first argument says."""
+    details = json.loads(sys.argv[1])
+    if cores := details.pop("cores"):
+        os.sched_setaffinity(0, cores)
+
     selector = Woken()
     with asyncio.Runner(loop_factory=lambda: asyncio.SelectorEventLoop(selector)) as runner:
-        runner.run(serve(selector, **json.loads(sys.argv[1])))
+        runner.run(serve(selector, **details))
 
 
 if __name__ == "__main__":

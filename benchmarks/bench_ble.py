@@ -1,6 +1,6 @@
 """Round trips over BLE beside the least that the radio's model allows, by connection interval and packet length.
 
-    python benchmarks/bench_ble.py [--requests 50] [--json] [--quick]
+    python -m benchmarks.bench_ble [--requests 50] [--json] [--quick]
 
 The driver talks to the simulated arm through bleak and a D-Bus of its own, so it needs Linux and dbus-daemon. The arm,
 its radio and the Bluetooth service are a process of their own, with a clock that is finer than that of an ordinary
@@ -28,8 +28,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import AsyncExitStack, contextmanager
 from multiprocessing.connection import Connection
 
-from report import Row, parsed, show
-
+from benchmarks.report import Row, parsed, show
 from dobot_async._core.protocol.transport import Transport
 from dobot_async.arms.magician.frame import Frame, Parser, encode
 from dobot_async.magician import commands as c

@@ -1,6 +1,6 @@
 """How late the end of a motion is noticed, from the arm's finishing to the return of the await, and what waiting costs.
 
-    python benchmarks/bench_completion.py [--motions 50] [--json] [--quick]
+    python -m benchmarks.bench_completion [--motions 100] [--json] [--quick]
 
 Each client moves the arm back and forth over ways of different lengths, and waits for the end of each. The minimal
 client does nothing but ask for the current index, as fast as it is answered; the others do what they do.
@@ -12,11 +12,9 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable
 
-import minimal
-import others
-from arm import Clock, arms
-from report import BAUD, Row, parsed, percentile, show
-
+from benchmarks import minimal, others
+from benchmarks.arm import Clock, arms
+from benchmarks.report import BAUD, Row, parsed, percentile, show
 from dobot_async import Magician, PTPMode
 from dobot_async.magician import commands as c
 from dobot_async.simulator import simulate
@@ -25,6 +23,7 @@ LINKS = {"pty": "pty", "115200 baud": f"pty:?baud={BAUD}"}
 PTP = c.SET_PTP_CMD.name
 WAYS = (10.0, 25.0, 17.0, 40.0, 5.0)  # mm
 SPEED = 2.0
+LOSS = 0.01
 Measure = tuple[list[float], float, float]  # when each await returned, requests per wait, CPU seconds per wait
 
 
@@ -96,9 +95,14 @@ def on_line(link: str, listen: str, motions: int) -> list[Row]:
         with arms(listen, speed=SPEED) as there:
             rows.append(row_of(link, name, asyncio.run(measured(measure, there.url, motions)), there.ended(PTP)))
 
+    if link == "115200 baud":
+        with arms(listen, speed=SPEED, loss=LOSS) as there:
+            found = asyncio.run(by_driver(there.url, max(motions // 2, 2)))
+            rows.append(row_of(f"{link}, 1 % lost", "dobot_async", found, there.ended(PTP)))
+
     for name in others.available():
         with arms(listen, speed=SPEED) as there:
-            few = max(motions // 2, 2)
+            few = max(motions // 4, 2)
             before = there.counters["requests"]
             done = others.measured(name, "wait", there.url, few)
             requests = (there.counters["requests"] - before) / few
@@ -114,10 +118,11 @@ async def measured(measure: Callable[[str, int], Awaitable[Measure]], url: str, 
 
 def main() -> None:
     """Prints a table, or one JSON object."""
-    options = parsed(__doc__, motions=50)
-    rows = asyncio.run(in_memory(options.motions))
+    options = parsed(__doc__, motions=100)
+    rows = asyncio.run(in_memory(max(options.motions // 4, 2)))
     for link, listen in LINKS.items():
-        rows += on_line(link, listen, options.motions)
+        motions = options.motions if "baud" in link else max(options.motions // 2, 2)
+        rows += on_line(link, listen, motions)
 
     show("completion", rows, as_json=options.json, motions=options.motions)
 

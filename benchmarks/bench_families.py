@@ -1,6 +1,6 @@
 """The myArm and the ultraArm beside the vendor's library: angles read a second, how late a motion's end is noticed.
 
-    python benchmarks/bench_families.py [--requests 200] [--motions 6] [--json] [--quick]
+    python -m benchmarks.bench_families [--requests 200] [--motions 6] [--json] [--quick]
 
 Over a pseudo-terminal at 115200 baud, the arm being in another process. A myArm loses frames that come closer than
 20 ms to one another, so the driver keeps that gap, and `limit_per_s` is what it allows; the library keeps none. The
@@ -16,10 +16,9 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-import others
-from arm import Arms, arms
-from report import BAUD, Row, parsed, percentile, show
-
+from benchmarks import others
+from benchmarks.arm import Arms, arms
+from benchmarks.report import BAUD, Row, parsed, percentile, show
 from dobot_async import MyCobot, UltraArm
 from dobot_async.arms.mycobot.arm import GAP
 from dobot_async.mycobot import commands as cobot

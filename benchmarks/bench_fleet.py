@@ -1,6 +1,6 @@
 """A fleet on lines of 115200 baud: how far apart its arms start, and how soon a stop is at all of them.
 
-    python benchmarks/bench_fleet.py [--rounds 40] [--json] [--quick]
+    python -m benchmarks.bench_fleet [--rounds 40] [--json] [--quick]
 
 The arms are simulated in other processes, which tell by one clock with this one what came to them, and when. `skew` is
 between the first and the last arm's beginning to execute what `fleet.together` started; `told` is what the fleet says
@@ -21,11 +21,10 @@ import tty
 from collections.abc import Sequence
 from importlib.util import find_spec
 
-import minimal
-from arm import Arms, crowd
-from fleet_over_zenoh import beside
-from report import Row, parsed, percentile, show
-
+from benchmarks import minimal
+from benchmarks.arm import Arms, crowd
+from benchmarks.fleet_over_zenoh import beside
+from benchmarks.report import Row, parsed, percentile, show
 from dobot_async import Fleet
 from dobot_async.magician import commands as c
 

@@ -1,6 +1,6 @@
 """How far arms are behind a target that moves: a circle of 60 mm, in two seconds round, over a line of 115,200 baud.
 
-    python benchmarks/bench_following.py [--rounds 10] [--json] [--quick] [--plot FILE]
+    python -m benchmarks.bench_following [--rounds 10] [--json] [--quick] [--plot FILE]
 
 In virtual time: the line carries its bytes and loses nothing, and neither program takes time of its own, so that the
 figures are the same in every run. `lag` is how long ago the target was where the arm is now, on the circle; `off_mm` is
@@ -11,16 +11,16 @@ from __future__ import annotations
 
 import asyncio
 import math
-import sys
 from argparse import ArgumentParser
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import async_solipsism
-import bench_lateness
-from report import Row, percentile, show
 
+import benchmarks.slow_line  # noqa: F401 - it adds its scheme
+from benchmarks import svg
+from benchmarks.report import Row, percentile, show
 from dobot_async import Magician, MyCobot, UltraArm
 from dobot_async.simulator import UltraArmQuirks, simulate
 
@@ -159,19 +159,9 @@ async def measured(kind: Kind, rounds: int) -> tuple[Row, Circle]:
 
 def plot(circles: dict[str, Circle], file: Path) -> None:
     """Draw the lags over the time."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - only for a plot
-
-    figure = Figure(figsize=(8, 4.5), layout="constrained")
-    axes = figure.subplots()
-    for name, circle in circles.items():
-        axes.plot([number / RATE for number in range(len(circle.lags))], circle.lags, label=name, linewidth=1)
-
-    axes.set(
-        xlabel="s", ylabel="lag, s", yscale="log", title="Behind a target on a circle of 60 mm, 0.5 Hz, 115200 baud"
-    )
-    axes.legend(fontsize="small", ncols=2)
-    axes.grid(visible=True, alpha=0.3)
-    figure.savefig(file, dpi=110)
+    curves = {name: [(number / RATE, lag) for number, lag in enumerate(each.lags)] for name, each in circles.items()}
+    label = "s behind a target on a circle of 60 mm, 0.5 Hz, 115200 baud"
+    file.write_text(svg.lines(label, "s", curves, log=True), encoding="utf-8")
 
 
 def main() -> None:
@@ -183,7 +173,6 @@ def main() -> None:
     options.add_argument("--plot", type=Path)
     chosen = options.parse_args()
     rounds = 3 if chosen.quick else chosen.rounds
-    sys.modules[bench_lateness.__name__] = bench_lateness  # where the scheme is looked for
     rows: list[Row] = []
     circles: dict[str, Circle] = {}
     for name, kind in KINDS.items():

@@ -1,6 +1,6 @@
 """How late the end of each kind of command is noticed, and what that costs in requests, in virtual time.
 
-    python benchmarks/bench_lateness.py [--motions 60] [--json] [--quick]
+    python -m benchmarks.bench_lateness [--motions 60] [--json] [--quick]
 
 The line carries 115,200 baud each way and loses nothing; neither program takes any time of its own. So the figures are
 those of the schedule of questions alone, and the same in every run and on every computer. `floor_ms` is what a client
@@ -12,84 +12,20 @@ from __future__ import annotations
 
 import asyncio
 import random
-import sys
 from collections.abc import Awaitable, Callable
-from pathlib import Path
 from typing import Any
-from urllib.parse import SplitResult
 
 import async_solipsism
-from report import BAUD, BITS, Row, parsed, percentile, show
 
+import benchmarks.slow_line  # noqa: F401 - it adds its scheme
+from benchmarks.report import BAUD, BITS, Row, parsed, percentile, show
 from dobot_async import Magician, MyCobot, PTPMode, UltraArm
-from dobot_async._core.protocol.transport import Transport
 from dobot_async.simulator import simulate
-from dobot_async.transports import SCHEMES, open_transport
 
 INDEX, ALARMS = (6, 14), (6, 22)  # bytes of question and answer
 FLOOR = (sum(INDEX) / 2 + INDEX[1] + sum(ALARMS)) * BITS / BAUD
 SEED = 1
 Go = Callable[[Any, random.Random], Awaitable[None]]
-
-
-class SlowLine:
-    """A line in memory that takes its time for each byte; each direction has its own."""
-
-    window = 16
-    in_flight = 8
-    reorder_window = 0.0
-
-    def __init__(self, inner: Transport) -> None:
-        self._inner = inner
-        self._loop = asyncio.get_running_loop()
-        self._out = self._in = 0.0
-        self._arrived: asyncio.Queue[bytes | Exception] = asyncio.Queue()
-        self._tasks = {asyncio.create_task(self._read())}
-
-    def write(self, data: bytes) -> bool:
-        """Take a frame; it reaches the arm once its last byte has gone out."""
-        self._out = max(self._out, self._loop.time()) + len(data) * BITS / BAUD
-        self._loop.call_at(self._out, self._reach, data)
-        return True
-
-    async def send(self, data: bytes) -> None:
-        """As `write`."""
-        self.write(data)
-
-    async def receive(self) -> bytes:
-        """Return what has come in whole."""
-        found = await self._arrived.get()
-        if isinstance(found, Exception):
-            raise found
-
-        return found
-
-    async def aclose(self) -> None:
-        """Close it."""
-        await self._inner.aclose()
-        await asyncio.wait(self._tasks)
-
-    def _reach(self, data: bytes) -> None:
-        task = asyncio.create_task(self._inner.send(data))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
-    async def _read(self) -> None:
-        try:
-            while True:
-                data = await self._inner.receive()
-                self._in = max(self._in, self._loop.time()) + len(data) * BITS / BAUD
-                self._loop.call_at(self._in, self._arrived.put_nowait, data)
-        except Exception as error:  # noqa: BLE001 - whoever receives is told
-            self._arrived.put_nowait(error)
-
-
-async def open_url(url: SplitResult, *, arm: str) -> Transport:
-    """Open `slow://HOST`: `sim://HOST` over a slow line."""
-    return SlowLine(await open_transport(f"sim://{url.netloc}", arm=arm))
-
-
-SCHEMES["slow"] = (Path(__file__).stem, "slow://HOST")
 
 
 def place(rng: random.Random) -> tuple[float, float, float]:
@@ -147,7 +83,6 @@ async def measured(kind: str, motions: int) -> Row:
 def main() -> None:
     """Prints a table, or one JSON object."""
     options = parsed(__doc__, motions=60)
-    sys.modules[Path(__file__).stem] = sys.modules["__main__"]  # where the scheme is looked for
     rows = []
     for kind in KINDS:
         with asyncio.Runner(loop_factory=async_solipsism.EventLoop) as runner:

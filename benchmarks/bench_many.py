@@ -1,6 +1,6 @@
 """Many arms in one process: each one's pose is read 20 times a second while it moves back and forth.
 
-    python benchmarks/bench_many.py [--seconds 4] [--json] [--quick]
+    python -m benchmarks.bench_many [--seconds 4] [--json] [--quick]
 
 The arms are simulated in other processes, on pseudo-terminals of unlimited speed. `moves` says how each one moves:
 "queued" gives it the next motions without waiting for their ends, "awaited" awaits each. A reading is due every 50 ms;
@@ -18,9 +18,8 @@ from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack, suppress
 from pathlib import Path
 
-from arm import crowd
-from report import Row, parsed, percentile, show
-
+from benchmarks.arm import crowd
+from benchmarks.report import Row, parsed, percentile, show
 from dobot_async import Magician
 
 COUNTS = (1, 10, 100, 300)

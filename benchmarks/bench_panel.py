@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import aiohttp
-from report import Row, parsed, show
+
+from benchmarks.report import Row, parsed, show
 
 
 class Viewer:

@@ -2,7 +2,7 @@
 
 Noise has no floor; its MB/s must not depend on how much of it there is, so both a part and the whole are measured.
 
-    python benchmarks/bench_parser.py [--frames 20000] [--json] [--quick]
+    python -m benchmarks.bench_parser [--frames 20000] [--json] [--quick]
 
 The ratio is what counts: both columns come from one run on one machine.
 """
@@ -13,8 +13,7 @@ import struct
 import time
 from collections.abc import Callable
 
-from report import Row, parsed, show
-
+from benchmarks.report import Row, parsed, show
 from dobot_async.arms.magician.frame import Frame, Parser, encode
 
 CHUNKS = (1, 20, 64, 4096)

@@ -1,6 +1,6 @@
 """Poses read one at a time through each serial backend, and with a trace: how many a second, what is added, and CPU.
 
-    python benchmarks/bench_serial.py [--requests 4000] [--json] [--quick]
+    python -m benchmarks.bench_serial [--requests 4000] [--json] [--quick]
 
 Over a pseudo-terminal as fast as the computer, and over one at 115200 baud, the arm being in another process. Backends
 take turns in several rounds, and the best round of each counts, but for the latencies: they are of all rounds. `ratio`
@@ -15,10 +15,9 @@ import tempfile
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
-from arm import arms
-from bench_roundtrip import LINKS, ROUNDS, Measure, timed
-from report import Row, parsed, percentile, show
-
+from benchmarks.arm import arms
+from benchmarks.bench_roundtrip import LINKS, ROUNDS, Measure, timed
+from benchmarks.report import Row, parsed, percentile, show
 from dobot_async import Magician
 
 USUAL = "pyserial"

@@ -1,6 +1,6 @@
 """A long continuous path (CP) through the arm's bounded queue, at the arm's pace: does it ever wait for its host?
 
-    python benchmarks/bench_stream.py [--points 10000] [--json] [--quick]
+    python -m benchmarks.bench_stream [--points 3000] [--json] [--quick]
 
 Points 0.5 mm apart on a circle, at 100 mm/s: 5 ms each, where a line of 115200 baud could carry one in 3.2 ms. A WAIT
 ahead of them lets the queue fill. From then on a point that is not there when the one before it ends is `starved`, and
@@ -16,10 +16,9 @@ import time
 from collections.abc import Awaitable, Callable
 from itertools import pairwise
 
-import minimal
-from arm import Arms, arms
-from report import BAUD, Row, parsed, show
-
+from benchmarks import minimal
+from benchmarks.arm import Arms, arms
+from benchmarks.report import BAUD, Row, parsed, show
 from dobot_async import Magician
 from dobot_async.magician import commands as c
 
@@ -108,7 +107,7 @@ async def measured(client: str, url: str, window: int, count: int) -> Measure:
 
 def main() -> None:
     """Prints a table, or one JSON object."""
-    options = parsed(__doc__, points=10_000)
+    options = parsed(__doc__, points=3000)
     rows: list[Row] = []
     for link, client, window in RUNS:
         with arms(LISTEN[link]) as there:

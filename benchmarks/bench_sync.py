@@ -1,6 +1,6 @@
 """What a blocking call takes beside the awaited one: a read of an arm in the same process, by three kinds of program.
 
-    python benchmarks/bench_sync.py [--rounds 3000] [--json] [--quick]
+    python -m benchmarks.bench_sync [--rounds 3000] [--json] [--quick]
 
 The arm answers at once, so that what is left is the driver and the ways between threads. `over` is by how much the
 median is above that of the awaited call; "nothing" is a call that does nothing in the arms' thread. anyio's blocking
@@ -15,8 +15,8 @@ import time
 from collections.abc import Callable
 
 from anyio.from_thread import start_blocking_portal
-from report import Row, parsed, percentile, show
 
+from benchmarks.report import Row, parsed, percentile, show
 from dobot_async import Magician
 from dobot_async.sync import Magician as BlockingMagician
 from dobot_async.sync import run

@@ -1,6 +1,6 @@
 """The part of bench_fleet that is over Zenoh: the same starts and stops, of arms that other processes serve.
 
-    python benchmarks/fleet_over_zenoh.py '{"names": ["arm0", "arm1"]}'
+    python -m benchmarks.fleet_over_zenoh '{"names": ["arm0", "arm1"]}'
 
 is such a process: it runs an arm and a server for each name, prints a JSON list of URLs, and answers "each" as arm.py
 does. The arms have no serial line, so what is found is the way of Zenoh alone, on the loopback interface: `round_trip`
@@ -20,9 +20,8 @@ from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import AsyncExitStack, ExitStack, contextmanager
 from typing import Any
 
-from arm import Arms
-from report import Row, percentile
-
+from benchmarks.arm import Arms
+from benchmarks.report import Row, percentile
 from dobot_async import Magician
 from dobot_async.bridge import bridge
 from dobot_async.magician import commands as c
@@ -107,7 +106,7 @@ def servers(count: int) -> Iterator[list[Arms]]:
 @contextmanager
 def server(names: Sequence[str]) -> Iterator[Arms]:
     """A process with the arms of some names."""
-    command = [sys.executable, __file__, json.dumps({"names": names})]
+    command = [sys.executable, "-m", "benchmarks.fleet_over_zenoh", json.dumps({"names": names})]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         try:
             yield Arms(process)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import statistics
 from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["BAUD", "BITS", "Row", "clients", "parsed", "percentile", "show", "text"]
+__all__ = ["BAUD", "BITS", "Row", "clients", "median", "paired", "parsed", "percentile", "show", "text"]
 
 Row = dict[str, Any]
 BAUD = 115200
@@ -38,6 +39,17 @@ def percentile(values: Sequence[float], percent: float) -> float:
     """The value below which so many percent lie: the nearest one that was measured."""
     ordered = sorted(values)
     return ordered[min(len(ordered) - 1, int(len(ordered) * percent / 100))]
+
+
+def median(values: Sequence[float], digits: int) -> float:
+    """The median, rounded."""
+    return round(statistics.median(values), digits)
+
+
+def paired(values: Sequence[float], beside: Sequence[float], digits: int = 3) -> tuple[float, str]:
+    """The median of the ratios of what was measured in the same rounds, and the least and the greatest of them."""
+    ratios = [value / other if other else 0.0 for value, other in zip(values, beside, strict=True)]
+    return median(ratios, digits), f"{min(ratios):.{digits}f} to {max(ratios):.{digits}f}"
 
 
 def show(name: str, rows: Sequence[Row], *, as_json: bool, **details: Any) -> None:

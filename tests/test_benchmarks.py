@@ -12,31 +12,35 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
 from virtual import virtual
 
+from benchmarks import svg
+from benchmarks.__main__ import NAMES
+from benchmarks.targets import TARGETS, verdicts
 from dobot_async import Magician
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import FILLER
 from dobot_async.simulator import Faults, simulate
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
-NEEDS = {"bench_ble.py": "dbus-daemon"}
+NEEDS = {"bench_ble": "dbus-daemon"}
 NOTHING = ("overflow", "timeouts")
 LINE = 0.0032  # seconds that a CP command and its acknowledgement take at 115200 baud
 POINTS, STEP, SPEED = 600, 0.5, 100.0
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
-@pytest.mark.parametrize("name", sorted(path.name for path in BENCHMARKS.glob("bench_*.py")))
+@pytest.mark.parametrize("name", sorted(path.stem for path in BENCHMARKS.glob("bench_*.py")))
 def test_runs_and_reports(name: str) -> None:
     needed = NEEDS.get(name)
     if needed and not shutil.which(needed) and not os.environ.get("DOBOT_REQUIRE_DBUS"):
         pytest.skip(f"{needed} is not installed")
 
-    command = [sys.executable, "-W", "error", str(BENCHMARKS / name), "--json", "--quick"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    command = [sys.executable, "-W", "error", "-m", f"benchmarks.{name}", "--json", "--quick"]
+    done = subprocess.run(command, cwd=BENCHMARKS.parent, capture_output=True, text=True, timeout=100, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     report = json.loads(done.stdout)
@@ -46,15 +50,60 @@ def test_runs_and_reports(name: str) -> None:
         assert row.get("junk", 0) % len(FILLER) == 0  # that is sent to an arm that somebody else keeps from answering
 
 
-def test_all_are_written_down_and_drawn(tmp_path: Path) -> None:
-    results = tmp_path / "RESULTS.md"
-    results.write_text("# Results\n\n<!-- parser -->\nold\n<!-- end of parser -->\n\nWords.\n")
-    command = [sys.executable, str(BENCHMARKS / "run_all.py"), "--quick", "--only", "parser", "queue"]
-    subprocess.run([*command, "--results", results, "--plots", tmp_path], check=True, timeout=100, capture_output=True)
-    written = results.read_text()
-    assert "old" not in written
-    assert written.index("floor_frames_per_s") < written.index("Words.") < written.index("ptp_per_s")
-    assert (tmp_path / "bench-queue.png").read_bytes().startswith(b"\x89PNG")
+def test_all_are_known_to_the_command() -> None:
+    assert {f"bench_{name}" for name in NAMES} == {path.stem for path in BENCHMARKS.glob("bench_*.py")}
+
+
+def test_what_was_found_is_written_down_quoted_and_drawn(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("Before.\n<!-- figures: lateness -->\nold\n<!-- end of figures -->\nBehind.\n")
+    command = [sys.executable, "-m", "benchmarks", "parser", "lateness", "--quick", "--docs", str(tmp_path)]
+    subprocess.run(
+        [*command, "--results", str(tmp_path / "RESULTS.md")],
+        check=True,
+        cwd=BENCHMARKS.parent,
+        timeout=100,
+        capture_output=True,
+    )
+    written = (tmp_path / "RESULTS.md").read_text()
+    assert written.index("## Targets") < written.index("floor_frames_per_s") < written.index("late_p50_ms")
+    quoted = page.read_text()
+    assert "old" not in quoted
+    assert quoted.index("Before.") < quoted.index("late_p50_ms") < quoted.index("Behind.")
+    plot = ET.fromstring((tmp_path / "bench-lateness.svg").read_text())
+    assert plot.tag == "{http://www.w3.org/2000/svg}svg"
+
+
+def test_targets_are_judged_by_the_rows_that_they_name() -> None:
+    slow = {"link": "115200 baud", "client": "dobot_async", "late_p50_ms": 4.6, "late_worst_ms": 7.2}
+    families = [
+        {"family": "myArm", "client": "dobot_async", "late_p50_ms": 37.0},
+        {"family": "myArm", "client": "pymycobot (myArm)", "late_p50_ms": 76.0},
+    ]
+    found = {"completion": [slow | {"link": "pty", "late_p50_ms": 99.0}, slow], "families": families}
+    verdict = {row["target"]: row["verdict"] for row in verdicts(found)}
+    assert verdict["end of a motion, median, ms, 115200 baud"] == "pass"
+    assert verdict["end of a motion, worst of 100, ms, 115200 baud"] == "FAIL"
+    assert verdict["myArm: how late its end is noticed, beside pymycobot"] == "pass"
+    assert verdict["ultraArm: how late its end is noticed, beside pymycobot"] == "not measured"
+
+
+def test_each_target_names_a_column_that_its_benchmark_has() -> None:
+    command = [sys.executable, "-m", "benchmarks.bench_startup", "--json", "--quick"]
+    done = subprocess.run(command, cwd=BENCHMARKS.parent, capture_output=True, text=True, timeout=100, check=True)
+    found = {"startup": json.loads(done.stdout)["rows"]}
+    wanted = [target for target in TARGETS if target.benchmark == "startup"]
+    assert wanted
+    assert all(target.figure(found) is not None for target in wanted)
+
+
+def test_plots_are_xml_with_a_shape_for_each_value() -> None:
+    drawn = svg.bars("a < b", {"x": {"one": 1.0, "two": 2000.0}, "y": {"two": 3.0}}, log=True)
+    ET.fromstring(drawn)
+    assert drawn.count("<rect") == 1 + 2 + 3  # the page, what the colours mean, the bars
+    drawn = svg.lines("s", "s", {"one": [(0.0, 0.0), (1.0, 2.0)], "two": [(0.0, 1.0), (2.0, 3.0)]})
+    ET.fromstring(drawn)
+    assert drawn.count("<polyline") == 2
 
 
 @virtual

@@ -30,7 +30,14 @@ def words(path: Path) -> set[str]:
 
 def test_modules_are_named_as_strings_in_the_places_alone_that_import_late() -> None:
     late = {path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*.py") if words(path) & IMPORTERS}
-    assert late == {"__init__.py", "arms/registry.py", "cli/main.py", "sync/__init__.py", "transports/__init__.py"}
+    assert late == {
+        "__init__.py",
+        "arms/registry.py",
+        "cli/main.py",
+        "sync/__init__.py",
+        "transports/__init__.py",
+        "_core/util/late.py",
+    }
 
 
 @pytest.mark.parametrize("statement", ["import dobot_async", "from dobot_async import Magician, open_transport"])
@@ -43,6 +50,35 @@ def test_importing_the_package_brings_in_nothing_that_is_not_used_yet(statement:
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
     assert ran.stdout.strip() == "[]"
     assert not ran.stderr
+
+
+FIRST_MOTION = """
+import asyncio, sys
+from dobot_async import Magician
+
+async def main():
+    async with Magician.connect("sim:") as arm:
+        await arm.queue.move_to(220, 0, 40)
+
+asyncio.run(main())
+print([name for name in {late!r} if name in sys.modules])
+"""
+
+
+def test_the_first_motion_of_a_simulated_arm_needs_no_other_family_and_no_way_to_it_from_outside() -> None:
+    late = ["dobot_async.simulator.mycobot", "dobot_async.simulator.ultraarm", "dobot_async.simulator.scene.scene"]
+    late += ["dobot_async.discovery", "dobot_async.endpoints", "dobot_async.arms.mycobot.arm", "importlib.metadata"]
+    program = FIRST_MOTION.format(late=late)
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert ran.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("package", ["simulator", "simulator.scene", "traces"])
+def test_packages_that_import_late_have_all_of_their_names(package: str) -> None:
+    module = __import__(f"dobot_async.{package}", fromlist=["__all__"])
+    assert [name for name in module.__all__ if not hasattr(module, name)] == []
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = module.nothing
 
 
 @pytest.mark.parametrize("family", REGISTERED)

@@ -1,4 +1,7 @@
-"""Where a simulated arm can be reached: in memory, on a pseudo-terminal, over TCP and UDP, by BLE; `simulate`."""
+"""Where a simulated arm can be reached: in memory, on a pseudo-terminal, over TCP and UDP, by BLE; `simulate`.
+
+What a place needs is imported when an arm is served there: most arms are in memory.
+"""
 
 from __future__ import annotations
 
@@ -12,18 +15,16 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from urllib.parse import urlsplit
 
 from dobot_async.arms.registry import Parts
-from dobot_async.endpoints.line_rate import RateLimited
-from dobot_async.endpoints.listeners import on_tcp, on_udp
-from dobot_async.endpoints.pty import on_pty
 from dobot_async.simulator.faults import Faults
 from dobot_async.simulator.memory import in_memory
-from dobot_async.simulator.scene import Mount, Scene
 from dobot_async.simulator.simulation import Simulation
 from dobot_async.transports.options import options
 
 if TYPE_CHECKING:
     from dobot_async.simulator.magician.arm import SimulatedMagician
     from dobot_async.simulator.mycobot.arm import SimulatedMyCobot
+    from dobot_async.simulator.scene.scene import Scene
+    from dobot_async.simulator.scene.things import Mount
     from dobot_async.simulator.ultraarm.arm import SimulatedUltraArm
 
 __all__ = ["MODELS", "simulate"]
@@ -154,7 +155,7 @@ async def simulate(
     simulation = Simulation(arm, faults or Faults(), seed, scene)
     async with AsyncExitStack() as stack:
         if scene is not None:
-            stack.callback(scene.attach(model, arm, mount or Mount()))
+            stack.callback(scene.attach(model, arm, mount))
 
         simulation.url = await serve(simulation, stack)
         stack.callback(simulation.end)
@@ -175,12 +176,19 @@ def endpoint(listen: str) -> Callable[[Simulation, AsyncExitStack], Awaitable[st
 
     with suppress(ValueError):
         place = urlsplit(listen)
-        sockets: dict[str, Callable[..., Awaitable[str]]] = {"tcp": on_tcp, "udp": on_udp}
-        serve = sockets.get(place.scheme)
-        if serve and place.hostname and place.geturl() == f"{place.scheme}://{place.netloc}":
-            return partial(serve, address=place.hostname, port=place.port or 0)
+        bare = place.geturl() == f"{place.scheme}://{place.netloc}"
+        if bare and place.hostname and place.scheme in {"tcp", "udp"}:
+            return partial(on_socket, scheme=place.scheme, address=place.hostname, port=place.port or 0)
 
     raise ValueError(f"cannot listen at {listen!r}; use memory, pty, tcp://127.0.0.1:0, udp://127.0.0.1:0 or ble")
+
+
+async def on_socket(simulation: Simulation, stack: AsyncExitStack, *, scheme: str, address: str, port: int) -> str:
+    """A socket of this computer."""
+    from dobot_async.endpoints.listeners import on_tcp, on_udp  # noqa: PLC0415 - see the module
+
+    serve = on_tcp if scheme == "tcp" else on_udp
+    return await serve(simulation, stack, address=address, port=port)
 
 
 async def on_ble(simulation: Simulation, stack: AsyncExitStack, **details: Any) -> str:
@@ -199,6 +207,9 @@ async def on_ble(simulation: Simulation, stack: AsyncExitStack, **details: Any) 
 
 async def on_line(simulation: Simulation, stack: AsyncExitStack, *, baud: int | None = None) -> str:
     """A pseudo-terminal, as fast as the computer or as slow as a serial line."""
+    from dobot_async.endpoints.line_rate import RateLimited  # noqa: PLC0415 - see the module
+    from dobot_async.endpoints.pty import on_pty  # noqa: PLC0415
+
     if baud is None:
         return await on_pty(simulation, stack)
 

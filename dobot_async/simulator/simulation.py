@@ -14,10 +14,11 @@ from random import Random
 from typing import TYPE_CHECKING, Any, Generic, Protocol
 
 from dobot_async.simulator.faults import Faults, FaultyChannel, LineState
-from dobot_async.simulator.scene import Scene
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
+
+    from dobot_async.simulator.scene.scene import Scene
 
     A = TypeVar("A", default=Any)
 else:

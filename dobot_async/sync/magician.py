@@ -250,6 +250,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
         check_reach: bool = False,
         reconnect: bool = False,
         reply_timeout: float | tuple[float, float] = (0.02, 0.5),
+        max_requests: float | None = None,
         workspace: Workspace | Box | Cylinder | None = None,
         record: Record | None = None,
     ) -> AbstractContextManager[Self]:
@@ -271,6 +272,9 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
                 timeout; Motions resolve if it is still the same run of the arm, else they raise MotionUnknown.
             reply_timeout: Seconds without an answer after which a request is sent again: the least and the most that it
                 may adapt itself to, or one fixed value.
+            max_requests: How many requests per second go to the arm, 5 or more, over a line that others need as well;
+                None sends as many as it answers. A call waits for its turn before its timeout begins; what stops the
+                arm does not wait. With few of them the end of a motion is noticed later.
             workspace: Where the tool may be, in mm and the arm's own coordinates: a `Workspace`, or a Box or Cylinder
                 that is allowed. Targets, and ways as far as they are known, raise OutsideWorkspace, a ValueError,
                 before anything is sent; docs/workspace.md says what is looked at.
@@ -292,6 +296,7 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
                 check_reach=check_reach,
                 reconnect=reconnect,
                 reply_timeout=reply_timeout,
+                max_requests=max_requests,
                 workspace=workspace,
                 record=record,
             ),

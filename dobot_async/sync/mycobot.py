@@ -173,6 +173,7 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         tolerance: Tolerance = (4.0, 8.0),
         limits: Mapping[str, Range] | None = None,
         gap: float = 0.02,
+        max_requests: float | None = None,
         workspace: Workspace | Box | Cylinder | None = None,
         record: Record | None = None,
     ) -> AbstractContextManager[Self]:
@@ -199,6 +200,9 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
             limits: Ranges of your own beside the model's, by joint and axis: `{"j2": (-90, 90), "z": (20, 400)}`.
                 Degrees and mm; what a motion names is checked before it is sent.
             gap: Seconds between two frames.
+            max_requests: How many requests per second go to the arm, 5 or more, over a line that others need as well;
+                None sends as many as it answers. A call waits for its turn before its timeout begins; what stops the
+                arm does not wait. With few of them the end of a motion is noticed later.
             workspace: Where the tool may be, in mm and the coordinates that the arm tells: a `Workspace`, or a Box or
                 Cylinder that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is
                 sent, or CommandRejected where it shows when its turn comes. Motions given in joints are not looked at;
@@ -226,6 +230,7 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
                 tolerance=tolerance,
                 limits=limits,
                 gap=gap,
+                max_requests=max_requests,
                 workspace=workspace,
                 record=record,
             ),

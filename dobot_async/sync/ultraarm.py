@@ -174,6 +174,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
         tolerance: float = 1.0,
         home_switches: tuple[int, int, int] | None = (1, 1, 1),
         on_stop: Literal["release", "finish"] = "release",
+        max_requests: float | None = None,
         workspace: Workspace | Box | Cylinder | None = None,
         record: Record | None = None,
     ) -> AbstractContextManager[Self]:
@@ -201,6 +202,9 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
                 and then `home` is done when something has moved.
             on_stop: What to do where M15 does not end a motion: "release" takes the power off the motors, after which
                 the arm has to be powered on and homed; "finish" lets it finish what is in its queue.
+            max_requests: How many requests per second go to the arm, 5 or more, over a line that others need as well;
+                None sends as many as it answers. A call waits for its turn before its timeout begins; what stops the
+                arm does not wait. With few of them the end of a motion is noticed later.
             workspace: Where the tool may be, in mm and the arm's own coordinates: a `Workspace`, or a Box or Cylinder
                 that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is sent, or
                 CommandRejected where it shows when its turn comes. Motions given in joints are not looked at; see
@@ -226,6 +230,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
                 tolerance=tolerance,
                 home_switches=home_switches,
                 on_stop=on_stop,
+                max_requests=max_requests,
                 workspace=workspace,
                 record=record,
             ),

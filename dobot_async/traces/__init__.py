@@ -6,7 +6,25 @@ async with Magician.connect("replay:trace.jsonl") as arm: ...
 
 from __future__ import annotations
 
-from dobot_async.traces.file import TraceFile
-from dobot_async.traces.reader import Trace, TraceLine, TraceProblem, read_trace
+from typing import TYPE_CHECKING
+
+from dobot_async._core.util.late import late
+
+if TYPE_CHECKING:
+    from dobot_async.traces.file import TraceFile
+    from dobot_async.traces.reader import (
+        Trace,
+        TraceLine,
+        TraceProblem,
+        read_trace,
+    )
+else:
+    __getattr__ = late(
+        __name__,
+        {
+            "file": ("TraceFile",),
+            "reader": ("Trace", "TraceLine", "TraceProblem", "read_trace"),
+        },
+    )
 
 __all__ = ["Trace", "TraceFile", "TraceLine", "TraceProblem", "read_trace"]

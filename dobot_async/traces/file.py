@@ -16,11 +16,9 @@ import logging
 import os
 import stat
 import time
-import uuid
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Self, TextIO
 
@@ -60,7 +58,7 @@ class TraceFile:
         self._max_bytes = max_bytes if self._path and self._path.is_file() else None
         self._keep = keep
         self._size = 0
-        self._run = uuid.uuid4().hex
+        self._run = os.urandom(16).hex()
         self._part = 0
         self._began: float | None = None
         self._connections: dict[object, Mapping[str, object]] = {}
@@ -117,6 +115,8 @@ class TraceFile:
 
         self._part += 1
         self._size = 0
+        from importlib import metadata  # noqa: PLC0415 - it is half as large as this library, and few record
+
         software = f"dobot_async {metadata.version('dobot-async')}"
         self._line("trace", {"version": VERSION, "software": software, "run": self._run, "part": self._part})
         for fields in self._connections.values():

@@ -16,13 +16,13 @@ from virtual import virtual
 from dobot_async import Fleet, Magician
 from dobot_async.simulator import simulate
 
-BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "bench_following.py"
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
 def rows() -> dict[str, dict[str, Any]]:
-    command = [sys.executable, str(BENCHMARK), "--json", "--rounds", "6"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=True)
+    command = [sys.executable, "-m", "benchmarks.bench_following", "--json", "--rounds", "6"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100, check=True)
     return {row["kind"]: row for row in json.loads(done.stdout)["rows"]}
 
 

@@ -43,6 +43,7 @@ NOT_THERE: dict[type[Any], set[str]] = {
             "send_nowait",
             "settle",
             "slot",
+            "turn",
         ),
         *("barrier", "sent_nowait"),
     },

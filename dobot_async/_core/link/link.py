@@ -18,6 +18,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcon
 from typing import Any, TypeVar
 
 from dobot_async._core.link.admission import Admission, Priority
+from dobot_async._core.link.budget import Budget
 from dobot_async._core.link.connection import Reopen
 from dobot_async._core.link.correlator import Outcome
 from dobot_async._core.link.exchange import Exchange
@@ -52,6 +53,7 @@ class Link(Exchange[F]):
         read_only: Refuse what changes anything.
         round_trip: How long to wait for answers.
         reopen: Opens the transport anew when it breaks; None lets the link end with it.
+        max_requests: How many a second it may send; None does not limit them.
 
     Attributes:
         heard_at: When the last frame came, in the loop's seconds.
@@ -75,6 +77,7 @@ class Link(Exchange[F]):
         read_only: bool = False,
         round_trip: RoundTrip | None = None,
         reopen: Reopen | None = None,
+        max_requests: float | None = None,
     ) -> None:
         super().__init__(transport, url, reopen, barriers=barriers, filler=filler, round_trip=round_trip or RoundTrip())
         self.events: Events[object] = Events()
@@ -88,6 +91,7 @@ class Link(Exchange[F]):
         self._read_only = read_only
         self._arrived_at = -math.inf
         self._admission = Admission(transport.in_flight)
+        self._budget = Budget(max_requests) if max_requests else None
 
     @property
     def reorder_window(self) -> float:
@@ -127,7 +131,8 @@ class Link(Exchange[F]):
         Args:
             command: The row of the family's command table.
             value: Its parameters, None where it has none.
-            timeout: Seconds until ReplyTimeout, repetitions included; the row's own by default.
+            timeout: Seconds until ReplyTimeout, repetitions included; the row's own by default. It counts from when
+                `max_requests` lets it be sent.
             urgent: It stops something: it goes ahead of everything, and is repeated until it is acknowledged.
 
         Raises:
@@ -177,6 +182,9 @@ class Link(Exchange[F]):
             raise ValueError(f"timeout must be above 0 seconds, not {timeout!r}")
 
         self._check()
+        if not urgent:
+            await self.turn()
+
         deadline = self._loop.time() + timeout
         priority = Priority.URGENT if urgent else Priority.IMMEDIATE
         if not self._admission.try_acquire(frame.key, priority):
@@ -205,6 +213,11 @@ class Link(Exchange[F]):
             raise ProtocolError(f"{name}: the arm's answer does not fit: {request.misfit}")
 
         raise ReplyTimeout(f"no answer to {name} from {self.url} within {timeout:.3g} s")
+
+    async def turn(self) -> None:
+        """Return when `max_requests` lets another request be sent."""
+        if self._budget:
+            await self._budget.turn()
 
     def slot(self, name: str, timeout: float) -> AbstractAsyncContextManager[None]:
         """While this is entered, a queued command may be out; it waits only where one request at a time may be.
@@ -281,6 +294,8 @@ class Link(Exchange[F]):
         """Count a frame, and tell those who look on."""
         if outgoing:
             self._stats.sent += 1
+            if self._budget:
+                self._budget.sent()
         else:
             self._stats.received += 1
 

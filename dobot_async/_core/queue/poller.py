@@ -4,6 +4,8 @@
 - When it may end in a moment: for the index alone, as fast as it is answered. An answer to anything else would come
   between the end and the answer that tells of it.
 - Where nothing tells when it ends: for the index, at intervals of 2 % of what the motion has taken so far.
+- One question at a time, and where an answer takes long, all of this less often: what is asked for anything but the end
+  is a small part of what the link can answer.
 """
 
 from __future__ import annotations
@@ -25,8 +27,9 @@ logger = logging.getLogger("dobot_async.queue")
 POLL = 0.003  # seconds between two looks, at the least, at an arm of which nothing tells how long it still needs
 SHARE, WIDEST = 0.02, 0.025  # of what its motion has taken so far, and seconds: the most
 LEAD = 0.002  # seconds before the earliest end, from when on the arm is asked as fast as it answers
-DENSE, SELDOM = 0.001, 0.25  # seconds from one question for the index to the next, at the least and at the most
-ALARMS = 0.2  # seconds after which the alarms are read as well, for a motion that an alarm keeps from ending
+DENSE, SELDOM = 0.001, 0.6  # seconds from one question for the index to the next, at the least and at the most
+ALARMS = 0.25  # seconds after which the alarms are read as well, for a motion that an alarm keeps from ending
+ROUND_TRIPS = 5  # that such an interval has at least
 UNWATCHED = 100  # Motions that may be pending although nobody awaits one; beyond, the arm is asked all the same
 
 
@@ -101,6 +104,7 @@ class StatusPoller:
 
     async def _poll(self) -> None:
         asked_at = alarms_at = near_since = -math.inf
+        took = 0.0
         head, since = None, self._clock()
         try:
             while self._wanted:
@@ -112,16 +116,20 @@ class StatusPoller:
                 pause = max(POLL, min(SHARE * (now - since), WIDEST))
                 try:
                     least = await self._queue.rest()
-                    near = least is not None and least <= LEAD
+                    now, lead = self._clock(), max(LEAD, took / 2)
+                    every = max(ALARMS, ROUND_TRIPS * took)
+                    near = least is not None and least <= lead
                     near_since = near_since if near else now
-                    alarms = now >= alarms_at + ALARMS and not (near and now < near_since + ALARMS)
-                    index = least is None or near or now >= asked_at + min(max(POLL, (now - since) / 2), SELDOM)
+                    alarms = now >= alarms_at + every and not (near and now < near_since + every)
+                    seldom = min(max(POLL, now - since), max(SELDOM, ROUND_TRIPS * took))
+                    index = least is None or near or now >= asked_at + seldom
                     alarms_at, asked_at = now if alarms else alarms_at, now if index else asked_at
                     if index or alarms:
                         await self._queue.look(alarms=alarms, index=index)
+                        took = (self._clock() - now) / (alarms + index)
 
                     if least is not None:
-                        pause = min(now + least - LEAD, alarms_at + ALARMS) - self._clock()
+                        pause = min(now + least - lead, alarms_at + every) - self._clock()
                 except DobotError as error:
                     self._queue.give_up(unseen(error))
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
 
+from dobot_async._core.link.budget import check_budget
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.protocol.transport import Transport
@@ -94,6 +95,7 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
         check_reach: bool = False,
         reconnect: bool = False,
         reply_timeout: float | tuple[float, float] = (0.02, 0.5),
+        max_requests: float | None = None,
         workspace: Workspace | Box | Cylinder | None = None,
         record: Record | None = None,
     ) -> AsyncGenerator[Self]:
@@ -115,6 +117,9 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
                 timeout; Motions resolve if it is still the same run of the arm, else they raise MotionUnknown.
             reply_timeout: Seconds without an answer after which a request is sent again: the least and the most that it
                 may adapt itself to, or one fixed value.
+            max_requests: How many requests per second go to the arm, 5 or more, over a line that others need as well;
+                None sends as many as it answers. A call waits for its turn before its timeout begins; what stops the
+                arm does not wait. With few of them the end of a motion is noticed later.
             workspace: Where the tool may be, in mm and the arm's own coordinates: a `Workspace`, or a Box or Cylinder
                 that is allowed. Targets, and ways as far as they are known, raise OutsideWorkspace, a ValueError,
                 before anything is sent; docs/workspace.md says what is looked at.
@@ -126,6 +131,7 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
             ConnectFailed: No arm answered; the message says what to check.
         """
         timeout = check_options(queue, on_error, timeout, reply_timeout)
+        budget = check_budget(max_requests)
         kept = workspace_of(workspace)
         if not window >= 1:
             raise ValueError(f"window must be at least 1, not {window!r}")
@@ -144,6 +150,7 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
                 read_only=not control,
                 round_trip=RoundTrip(floor, ceiling),
                 reopen=partial(reopen, found) if reconnect else None,
+                max_requests=budget,
             )
             return cls(
                 link,

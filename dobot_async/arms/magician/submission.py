@@ -109,6 +109,7 @@ class Submission:
         if self._datagrams:
             await self._datagrams.before_command()
 
+        await self._link.turn()
         async with self._link.slot("a queued command", SILENCE):
             if not source:
                 return
@@ -132,6 +133,10 @@ class Submission:
         unchecked = 0
         while True:
             while source and self.space.room and sum(not r.outcome for r, count in sent if not count) < self._window:
+                await self._link.turn()
+                if not source:
+                    break
+
                 sent.append((await self._post(source.take()), 0))
                 unchecked += 1
                 if unchecked == self._window:

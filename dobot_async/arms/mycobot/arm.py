@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal, Self, TypeVar, cast
 
+from dobot_async._core.link.budget import check_budget
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.protocol.transport import Transport
@@ -101,6 +102,7 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         tolerance: Tolerance = TOLERANCE,
         limits: Mapping[str, Range] | None = None,
         gap: float = GAP,
+        max_requests: float | None = None,
         workspace: Workspace | Box | Cylinder | None = None,
         record: Record | None = None,
     ) -> AsyncGenerator[Self]:
@@ -127,6 +129,9 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
             limits: Ranges of your own beside the model's, by joint and axis: `{"j2": (-90, 90), "z": (20, 400)}`.
                 Degrees and mm; what a motion names is checked before it is sent.
             gap: Seconds between two frames.
+            max_requests: How many requests per second go to the arm, 5 or more, over a line that others need as well;
+                None sends as many as it answers. A call waits for its turn before its timeout begins; what stops the
+                arm does not wait. With few of them the end of a motion is noticed later.
             workspace: Where the tool may be, in mm and the coordinates that the arm tells: a `Workspace`, or a Box or
                 Cylinder that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is
                 sent, or CommandRejected where it shows when its turn comes. Motions given in joints are not looked at;
@@ -144,6 +149,7 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         reply_timeout = reply_times(url) if reply_timeout is None else reply_timeout
         timeout = check_options(queue, on_error, timeout, reply_timeout)
         gap = check_duration(gap, "gap")
+        budget = check_budget(max_requests)
         kept = workspace_of(workspace)
         if len(tolerance) != 2 or not min(check_duration(each, "tolerance") for each in tolerance) > 0:
             raise ValueError(f"tolerance must be degrees and mm, both above 0, not {tolerance!r}")
@@ -161,6 +167,7 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 read_only=not control,
                 round_trip=RoundTrip(floor, ceiling),
                 reopen=partial(reopen, found) if reconnect else None,
+                max_requests=budget,
             )
 
         build = partial(

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
 
+from dobot_async._core.link.budget import check_budget
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.protocol.transport import Transport
@@ -97,6 +98,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         tolerance: float = 1.0,
         home_switches: tuple[int, int, int] | None = (1, 1, 1),
         on_stop: Literal["release", "finish"] = "release",
+        max_requests: float | None = None,
         workspace: Workspace | Box | Cylinder | None = None,
         record: Record | None = None,
     ) -> AsyncGenerator[Self]:
@@ -124,6 +126,9 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 and then `home` is done when something has moved.
             on_stop: What to do where M15 does not end a motion: "release" takes the power off the motors, after which
                 the arm has to be powered on and homed; "finish" lets it finish what is in its queue.
+            max_requests: How many requests per second go to the arm, 5 or more, over a line that others need as well;
+                None sends as many as it answers. A call waits for its turn before its timeout begins; what stops the
+                arm does not wait. With few of them the end of a motion is noticed later.
             workspace: Where the tool may be, in mm and the arm's own coordinates: a `Workspace`, or a Box or Cylinder
                 that is allowed. What leads outside raises OutsideWorkspace, a ValueError, before anything is sent, or
                 CommandRejected where it shows when its turn comes. Motions given in joints are not looked at; see
@@ -145,6 +150,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         if home_switches is not None and (len(home_switches) != 3 or not {*home_switches} <= {0, 1}):
             raise ValueError(f"home_switches must be three of 0 and 1, or None, not {home_switches!r}")
 
+        budget = check_budget(max_requests)
         kept = workspace_of(workspace)
         floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
         reopen = partial(opened, timeout=timeout)
@@ -159,6 +165,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 read_only=not control,
                 round_trip=RoundTrip(floor, ceiling),
                 reopen=partial(reopen, found) if reconnect else None,
+                max_requests=budget,
             )
             return cls(
                 link,

@@ -175,8 +175,8 @@ class Scene:
 
         return self._clock
 
-    def attach(self, model: str, arm: Any, mount: Mount) -> Callable[[], None]:
-        """Puts a simulated arm into the scene; returns what takes it out again.
+    def attach(self, model: str, arm: Any, mount: Mount | None = None) -> Callable[[], None]:
+        """Puts a simulated arm into the scene, at the origin if not told where; returns what takes it out again.
 
         Raises:
             ValueError: The name of the mount is taken, no scene is known for this model, or what is plugged into the
@@ -186,6 +186,7 @@ class Scene:
             raise ValueError(f"a scene is made for {', '.join(ARMS)}, not for {model!r}")
 
         self.refresh()
+        mount = mount or Mount()
         if mount.name in {scene_arm.mount.name for scene_arm in self._arms}:
             raise ValueError(f"an arm is called {mount.name!r} in the scene already: give each mount a name=")
 
