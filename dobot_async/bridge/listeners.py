@@ -110,7 +110,7 @@ async def open_listeners(
             elif place.scheme == "udp":
                 known = UDPListener(authenticator)
                 urls.append(
-                    await on_udp(host, stack, address=address, port=port, admit=known.admit, crowded=known.crowded)
+                    await on_udp(host, stack, address=address, port=port, admit=known.admit, on_full=known.on_full)
                 )
             elif place.scheme == "zenoh":
                 from dobot_async.bridge.zenoh import on_zenoh  # noqa: PLC0415 - it needs an extra
@@ -199,9 +199,9 @@ class UDPListener:
             return data
 
         reason = "a wrong token, or none" if authenticator.token else "what it says is nothing that this arm is told"
-        authenticator.refuse("udp", f"a datagram of a stranger: {reason}")
+        authenticator.refuse("udp", f"a datagram of an unauthenticated client: {reason}")
         return None
 
-    def crowded(self, name: str) -> None:
+    def on_full(self, name: str) -> None:
         """One more than there may be has sent something."""
         self._authenticator.refuse(name, f"{MANY} others use this port by udp, which is as many as may")

@@ -117,7 +117,7 @@ class FleetArm:
                 limits=FleetLimits(self.name, member.limits, member.base),
             )
             if options.get("queue") == "keep" and self.commands:
-                await guard.glimpse()
+                await guard.assume_anywhere()
                 self._follower.leave(guard, lambda: self.family.leftovers(arm))
             else:
                 await guard.locate()

@@ -3,7 +3,7 @@
     put --> plan (planner) --> zones on it --request--> enter --> sent --> done --> the zones behind are released
 
 The arm holds a zone from before a motion into it is sent until the arm is known to stand outside, so that two guarded
-arms are never in one zone, whatever programs do. Where it may be is found out in `whereabouts`; each way of one that
+arms are never in one zone, whatever programs do. Where it may be is found out in `zone_tracker`; each way of one that
 was switched off and on may lead anywhere in its reach, until it was homed.
 
 What is looked at is the tool's place; `clearance` is for what is around it.

@@ -80,7 +80,7 @@ class ZoneTracker(Generic[S]):
         self._standing: frozenset[str] = frozenset()
         self._located = False
         self._loose: list[frozenset[str]] = []  # where the arm may be by what is no step: jogs, leftovers, changes
-        self._mute = False  # whether it did not tell where it is when it was asked last
+        self._silent = False  # whether it did not tell where it is when it was asked last
         self._looking = 0
         self._plans = 0
         holder.moving = lambda: bool(steps or self._loose or self._looking)
@@ -105,7 +105,7 @@ class ZoneTracker(Generic[S]):
             self._plans += 1
             self._stance = course.end
 
-    async def glimpse(self) -> None:
+    async def assume_anywhere(self) -> None:
         """Take the arm to go anywhere in its reach, from now on until `until` has ended."""
         await self._planner.look()
         self._loose.append(self._anywhere())
@@ -157,12 +157,12 @@ class ZoneTracker(Generic[S]):
         """Find out where the arm stands once it does; raise DobotError if it does not tell."""
         plans = self._plans
         self._looking += 1
-        self._mute = True
+        self._silent = True
         try:
             await self._queue.stops_heard()
             await self._rest()
             stance = await self._planner.look()
-            self._mute = False
+            self._silent = False
             if plans == self._plans and not self._loose:
                 self._stands(stance)
         finally:
@@ -172,7 +172,7 @@ class ZoneTracker(Generic[S]):
     @property
     def is_sought(self) -> bool:
         """Whether the arm rests somewhere that it is still to be asked about. One that has failed is asked once."""
-        return not (self._located or self._busy or (self._mute and self._holder.failure))
+        return not (self._located or self._busy or (self._silent and self._holder.failure))
 
     @property
     def _busy(self) -> bool:

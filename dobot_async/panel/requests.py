@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dobot_async.panel.session import PageSession
     from dobot_async.panel.station import Station
 
-__all__ = ["PageRequest", "PanelAction", "told_of_tools", "verb"]
+__all__ = ["PageRequest", "PanelAction", "switch_tool", "verb"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def verb(text: str, do: Callable[[ArmView], Coroutine[Any, Any, Any]]) -> PanelA
     return PanelAction(lambda call: call.work(text, lambda view, _: do(view)))
 
 
-def told_of_tools(
+def switch_tool(
     call: PageRequest, text: str, do: Callable[[ArmView], Coroutine[Any, Any, Any]]
 ) -> Coroutine[Any, Any, Any]:
     """Switch something, also beside a jog, and tell everybody."""

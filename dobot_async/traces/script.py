@@ -21,7 +21,7 @@ from dobot_async.traces.reader import Trace
 __all__ = ["Script", "Unrecorded"]
 
 SLACK = 0.25
-"""Seconds by which a question may come earlier than it did, and for which an arm may owe an answer."""
+"""Seconds by which a question may come earlier than it did, and for which an answer may be outstanding."""
 
 
 class Unrecorded(Exception):

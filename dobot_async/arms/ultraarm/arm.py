@@ -17,7 +17,7 @@ from dobot_async._core.util.arguments import check_choice, check_duration
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.tasks import STAYING
 from dobot_async._core.util.workspace import Workspace, workspace_of
-from dobot_async.arms.session import arm_session, check_options, run_owned
+from dobot_async.arms.session import arm_session, bounds_of, check_options, run_owned
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.following import UltraArmFollowing
 from dobot_async.arms.ultraarm.frame import BARRIERS, Frame, Parser, encode
@@ -146,7 +146,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
             raise ValueError(f"home_switches must be three of 0 and 1, or None, not {home_switches!r}")
 
         kept = workspace_of(workspace)
-        floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
+        floor, ceiling = bounds_of(reply_timeout)
         reopen = partial(opened, timeout=timeout)
 
         def build(transport: Transport, found: str) -> UltraArm:
