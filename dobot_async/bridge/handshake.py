@@ -1,4 +1,4 @@
-"""Who is let in by tcp and ws: a connection is a pending one until it has shown that it may come in.
+"""The handshake of tcp and ws: a connection is pending until it is authenticated.
 
     connected --> PendingConnection --token, or a family's first bytes--> Host.client
                     `-- too late, too many, wrong: turned away

@@ -1,9 +1,9 @@
-"""Where clients come in, and who is let in: addresses, tokens, TLS.
+"""The listeners of a bridge, and who may connect: addresses, tokens, TLS.
 
     pty          whoever may open the terminal
     tcp          the first line is TOKEN and the token
     udp          any datagram may begin with that line; its sender is then known for a while
-    zenoh        who may is Zenoh's own affair: its access control, TLS, and where it listens
+    zenoh        decided by Zenoh: its access control, TLS, and where it listens
     ws           a header (Authorization: Bearer), ?token= in the URL, or the line as the first text message
 
 A token is needed on every address but this computer's own. Without one a web page must not get through to the arm,

@@ -1,4 +1,4 @@
-"""The end of a client that may move the arm: an arm in the middle of a motion is stopped, until it is seen to stand."""
+"""The end of a lease holder: an arm in the middle of a motion is stopped, until it is seen at rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a broadcast has to be sent so that each network of this computer hears it."""
+"""The broadcast address of each network of this computer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One arm in its fleet: what it may send, what it holds, and what becomes of the fleet when it fails."""
+"""One arm in its fleet: admission of its motions, the zones that it holds, and the consequences of its failure."""
 
 from __future__ import annotations
 

@@ -1,16 +1,15 @@
-"""Where one arm may be, and the zones that it holds for that.
+"""The zones that one arm may be in, and so has to hold.
 
     enter --> steps --> each done: what is behind is released
     jogs, homing, leftovers: all within its reach, until it rests --locate--> where it stands
 
 1. Where the arm may be is `standing`, the zones of all steps that have not ended, and everything in its reach while it
    is on a way that is not known: homing, jogs, and what an earlier program has left in its queue.
-2. It is read from the arm alone, when no step is left and the arm has heard its stop and rests.
-3. An arm without anything to do is looked at again before its next motion: it may have been switched off, or led by
-   hand.
+2. It is read from the arm only when no step is left and the arm has acknowledged its stop and rests.
+3. The pose of an idle arm is read again before its next motion: it may have been switched off, or guided by hand.
 4. An arm that was switched off and on does not know where it is: it may be anywhere in its reach until it was homed.
-5. Whatever ends, a step, a jog or a look, all requests are judged anew: an arm that does not tell where it stands keeps
-   what it holds, and yet it rests. It is asked again until it tells.
+5. When a step, a jog or a reading ends, all requests are decided again: an arm whose pose cannot be read keeps its
+   zones, and yet it rests. It is read again until it answers.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
-"""The commands for one arm: who may give them, which were given already, and what became of each.
+"""The commands for one arm: which session may send them, which were executed already, and their results.
 
     message --> JSON, session, id --> known id? the same reply again
-                                      stop            anybody, at once; it ends the lease of who has it
+                                      stop            any session, at once; it ends the lease
                                       take_lease      for some seconds; taken again it goes on
                                       release_lease
-                                      an action       for who has the lease
+                                      an action       for the holder of the lease
 
-A session is whatever says its name: nothing but the broker's access control tells one from another. It is gone when its
-lease was not taken again in time, when it gives it back, when somebody else stops the arm, and when the broker is lost.
-What it had the arm do is ended then, before anybody else gets the lease.
+A session is identified by its name alone; only the broker's access control separates sessions. It ends when its lease
+expires or is released, when another session stops the arm, and when the broker is lost. Its motions are ended then,
+before another session gets the lease.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""One message of a page, and what can be done with it.
+"""A request of a page, and the actions that requests name.
 
-An action reads its arguments at once, so that what is wrong is told before anything is done, and returns a value, or
-what is to be awaited. A motion is a `ArmTask` of its arm.
+An action checks its arguments before it does anything, and returns a value or an awaitable. A motion is an `ArmTask` of
+its arm.
 """
 
 from __future__ import annotations

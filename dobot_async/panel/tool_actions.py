@@ -1,4 +1,4 @@
-"""What a page asks for that switches something: tools, pins, belts, the laser; and what is said of the arm."""
+"""The actions of a page that switch something: tools, pins, belts, the laser; and settings of the arm."""
 
 from __future__ import annotations
 
