@@ -3,8 +3,8 @@
     put --> plan (planner) --> zones on it --request--> enter --> sent --> done --> the zones behind are released
 
 The arm holds a zone from before a motion into it is sent until the arm is known to stand outside, so that two guarded
-arms are never in one zone, whatever programs do. Where it may be is found out in `zone_tracker`; the path of an un-homed
-arm may lead anywhere in its reach.
+arms are never in one zone, whatever programs do. Where it may be, `zone_tracker` knows; the path of an un-homed arm
+may lead anywhere in its reach.
 
 Paths are those of the tool centre point; `clearance` is for what is around it.
 """
