@@ -106,7 +106,7 @@ class Arms:
         return json.loads(line)
 
 
-class Ear:
+class MeteredHost:
     """A host behind serial lines; notes when some bytes have come in.
 
     It notes when they are through the line, not when the simulator, which has many arms to attend to, gets to them.
@@ -156,7 +156,7 @@ class Woken(selectors.SelectSelector):
 
 @dataclass
 class Listener:
-    """A client of an `Ear`."""
+    """A client of an `MeteredHost`."""
 
     line: RateLimitedPeer[Any]
     note: Callable[[bytes], None]
@@ -211,12 +211,12 @@ class Served:
 
     Attributes:
         simulations: The arms.
-        ears: Their lines, if they listen for something.
+        hosts: Their lines, if they listen for something.
         speed: Of their clocks.
     """
 
     simulations: list[Simulation]
-    ears: list[Ear]
+    hosts: list[MeteredHost]
     speed: float
 
 
@@ -258,10 +258,10 @@ async def serve(selector: Woken, *, listen: str, model: str, speed: float, count
             for _ in range(count)
         ]
         heard = bytes.fromhex(hears)
-        ears = [Ear(simulation, BAUD, heard, lambda: selector.at) for simulation in simulations if heard]
-        urls = [await on_pty(ear, stack) for ear in ears] or [simulation.url for simulation in simulations]
+        hosts = [MeteredHost(simulation, BAUD, heard, lambda: selector.at) for simulation in simulations if heard]
+        urls = [await on_pty(host, stack) for host in hosts] or [simulation.url for simulation in simulations]
         print(json.dumps(urls), flush=True)
-        served = Served(simulations, ears, speed)
+        served = Served(simulations, hosts, speed)
         questions = asyncio.StreamReader()
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(questions), sys.stdin)
         while line := (await questions.readline()).decode().strip():
@@ -294,7 +294,7 @@ def each(served: Served) -> list[list[tuple[str, float, float]]]:
 
 def heard(served: Served) -> list[list[float]]:
     """When what they listen for had come in on each line."""
-    return [ear.heard for ear in served.ears]
+    return [host.heard for host in served.hosts]
 
 
 ANSWERS = {"counters": counters, "executed": executed, "each": each, "heard": heard}

@@ -78,7 +78,7 @@ async def nothing_left_in_loop() -> AsyncIterator[None]:
     tasks = asyncio.all_tasks() - {asyncio.current_task()}
     assert not tasks, f"left behind: {tasks}"
 
-    # A peer that has just been hung up on closes its own end when it hears of it.
+    # A peer that has just been disconnected closes its own end when it hears of it.
     for _ in range(ROUNDS):
         left = descriptors() - before
         if not left:

@@ -436,10 +436,10 @@ async def test_arms_in_the_wifi_answer_a_broadcast() -> None:
 async def test_an_address_that_this_computer_does_not_have_hinders_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     async with arms(1) as (sims, [(target, port)]):
         monkeypatch.setattr(wifi, "PORT", port)
-        monkeypatch.setattr(wifi, "ways_out", lambda: [("192.0.2.1", target), ("127.0.0.1", target)])
+        monkeypatch.setattr(wifi, "broadcast_targets", lambda: [("192.0.2.1", target), ("127.0.0.1", target)])
         (found,) = await first(WiFiModules())
         assert f"{found.url}:8899" == sims[0].url
-        monkeypatch.setattr(wifi, "ways_out", lambda: [("192.0.2.1", target)])
+        monkeypatch.setattr(wifi, "broadcast_targets", lambda: [("192.0.2.1", target)])
         with pytest.raises(OSError, match="Cannot assign"):
             await first(WiFiModules())
 
@@ -514,11 +514,11 @@ TWO_ARMS = """
 import asyncio
 from contextlib import AsyncExitStack
 from dobot_async import discover
-from dobot_async.discovery.interfaces import ways_out
+from dobot_async.discovery.interfaces import broadcast_targets
 from dobot_async.simulator import announced, simulate
 
 async def main():
-    print([target for _, target in ways_out()])
+    print([target for _, target in broadcast_targets()])
     async with AsyncExitStack() as stack:
         for network in (0, 1):
             listen = f"udp://10.77.{network}.1:8899"

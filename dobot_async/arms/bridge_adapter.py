@@ -145,7 +145,7 @@ class BridgeAdapter(Protocol[F]):
         ...
 
     @property
-    def insisting(self) -> Sequence[F]:
+    def escalated_stop(self) -> Sequence[F]:
         """What is said instead to an arm that has heard `stopping` several times and is still seen to move."""
         ...
 
@@ -159,7 +159,7 @@ class BridgeAdapter(Protocol[F]):
         ...
 
     @property
-    def denials(self) -> Mapping[str, Collection[Hashable]]:
+    def deny_groups(self) -> Mapping[str, Collection[Hashable]]:
         """Groups of commands that can be blocked, by name: the subjects of their requests."""
         ...
 
@@ -174,7 +174,7 @@ class BridgeAdapter(Protocol[F]):
         ...
 
     async def open(self, url: str, timeout: float) -> Transport:
-        """Opens the way to an arm, with the family's manners; raises ConnectFailed if that takes too long."""
+        """Opens the way to an arm, with the family's options; raises ConnectFailed if that takes too long."""
         ...
 
     def parser(self) -> Parser[F]:
@@ -201,7 +201,7 @@ class BridgeAdapter(Protocol[F]):
         ...
 
     def subject(self, request: F) -> Hashable:
-        """Returns what `denials` call a request."""
+        """Returns what `deny_groups` call a request."""
         ...
 
     def name(self, request: F) -> str:
@@ -216,7 +216,7 @@ class BridgeAdapter(Protocol[F]):
         """Returns whether it does no harm to send it again: never for what moves anything."""
         ...
 
-    def may_be_silent(self, request: F) -> bool:
+    def ack_optional(self, request: F) -> bool:
         """Returns whether the arm may take a request and answer nothing."""
         ...
 
@@ -227,7 +227,7 @@ class BridgeAdapter(Protocol[F]):
     def check(self, request: F) -> None:
         """Raises ProtocolError for a frame that the arm could not take."""
 
-    def aside(self, frame: F) -> bool:
+    def is_unsolicited(self, frame: F) -> bool:
         """Returns whether a frame that nobody waits for is for who moves the arm; else it is late, and for nobody."""
         ...
 
@@ -245,7 +245,7 @@ class ByKey(ABC, Generic[F]):
     stopping: Sequence[F] = ()
 
     @property
-    def insisting(self) -> Sequence[F]:
+    def escalated_stop(self) -> Sequence[F]:
         """Nothing else than `stopping`."""
         return self.stopping
 
@@ -271,7 +271,7 @@ class ByKey(ABC, Generic[F]):
         """Returns the key."""
         return request.key
 
-    def aside(self, frame: F) -> bool:  # noqa: ARG002 - its key tells that nobody waits for it
+    def is_unsolicited(self, frame: F) -> bool:  # noqa: ARG002 - its key tells that nobody waits for it
         """Returns False."""
         return False
 

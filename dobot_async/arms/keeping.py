@@ -1,4 +1,4 @@
-"""What keeps a jog in the workspace: nothing tells where it will end, so the arm is asked where it is."""
+"""Workspace check of a jog: its end is not known, so the pose is polled while it moves."""
 
 from __future__ import annotations
 

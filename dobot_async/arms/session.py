@@ -18,7 +18,7 @@ from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTi
 from dobot_async.traces.recorder import RecordSettings, recorded
 from dobot_async.transports import open_transport
 
-__all__ = ["arm_session", "check_options", "open_in_time", "run_owned"]
+__all__ = ["arm_session", "bounds_of", "check_options", "open_in_time", "run_owned"]
 
 Q = TypeVar("Q")
 LEAST = 1.0
@@ -49,6 +49,11 @@ class Session(Protocol):
 S = TypeVar("S", bound=Session)
 
 
+def bounds_of(reply_timeout: float | tuple[float, float]) -> tuple[float, float]:
+    """Return the least and the most seconds until a request is sent again, given as one value or as both."""
+    return reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
+
+
 def check_options(queue: str, on_error: str, timeout: float, reply_timeout: float | tuple[float, float]) -> float:
     """Check what `connect` takes in all families; return the timeout.
 
@@ -57,7 +62,7 @@ def check_options(queue: str, on_error: str, timeout: float, reply_timeout: floa
     """
     check_choice("queue", queue, "fresh", "keep")
     check_choice("on_error", on_error, "stop", "leave")
-    floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
+    floor, ceiling = bounds_of(reply_timeout)
     if not 0 < floor <= ceiling < float("inf"):
         raise ValueError(f"reply_timeout must be seconds, or (least, most), above 0 and finite, not {reply_timeout!r}")
 

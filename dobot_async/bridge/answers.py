@@ -1,4 +1,4 @@
-"""What a client is told of its requests: as each is answered, or in the order of the requests if its family has one."""
+"""The replies to a client's requests: delivered as they come, or in the order of the requests where needed."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """One client of a bridge: its bytes become frames, its frames become requests, as fast as it may and as it can wait.
 
-    bytes --> inbox --> Parser --> waiting --> requests, a few at a time --> Desk
+    bytes --> inbox --> Parser --> waiting --> requests, a few at a time --> RequestHandler
                           `-- stops: at once
 
 What it sends beyond its limits waits with it: the inbox is bounded, and a stream is not read while it is full. Nothing
@@ -57,9 +57,9 @@ class Client(Generic[F]):
         handler: RequestHandler[F],
         family: BridgeAdapter[F],
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
+        disconnect: Callable[[], None],
         *,
-        hold: Callable[[bool], None],
+        pause_reading: Callable[[bool], None],
         name: str,
         ordered: bool,
         limits: Limits,
@@ -73,8 +73,8 @@ class Client(Generic[F]):
         self._handler = handler
         self._family = family
         self._deliver = deliver
-        self._hang_up = hang_up
-        self._hold = hold
+        self._disconnect = disconnect
+        self._pause_reading = pause_reading
         self._limits = limits
         self._loop = asyncio.get_running_loop()
         self._parser = family.requests()
@@ -109,7 +109,7 @@ class Client(Generic[F]):
         self._read()
         if len(self._inbox) > INBOX and self.ordered:
             self._held = True
-            self._hold(True)
+            self._pause_reading(True)
 
         self._news.set()
 
@@ -119,14 +119,14 @@ class Client(Generic[F]):
             self._deliver(data)
 
     def dismiss(self) -> None:
-        """Ends the connection as far as it can be ended, and is deaf and mute from now on."""
+        """Ends the connection as far as it can be ended, and ignores the client from now on."""
         if not self.gone:
             self.gone = True
             self._inbox.clear()
             self._waiting.clear()
             # A datagram client stays known, so that its later datagrams are not taken for a new client's.
             if self.ordered:
-                self._hang_up()
+                self._disconnect()
 
     def leave(self) -> None:
         """The connection has ended."""
@@ -187,7 +187,7 @@ class Client(Generic[F]):
 
             if self._held:
                 self._held = False
-                self._hold(False)
+                self._pause_reading(False)
 
     def _overdue(self) -> None:
         """Nothing has come for a while: gives up half a frame, and a client that cannot say that it goes."""
@@ -197,7 +197,7 @@ class Client(Generic[F]):
             self._news.set()
 
         if not self.ordered and self._loop.time() - self._heard > self._limits.silence:
-            self._hang_up()
+            self._disconnect()
 
     def _read(self) -> None:
         """Makes requests of what has come, no more than may wait."""

@@ -1,4 +1,4 @@
-"""What a bridge tells of itself: its events, of which strangers can cause only so many."""
+"""The events of a bridge; those that any peer can cause are limited in number."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ BURST = 40
 
 @dataclass(frozen=True, slots=True)
 class BridgeEvent:
-    """What happened at a bridge, in printable ASCII whatever strangers have said.
+    """What happened at a bridge, in printable ASCII whatever a peer has sent.
 
-    A kind of event that strangers can cause is told 40 times at once, then once or twice a second; the next one says
+    A kind of event that any peer can cause is told 40 times at once, then once or twice a second; the next one says
     how many were left out.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Who is let in by tcp and ws: a connection is a pending one until it has shown that it may come in.
+"""The handshake of tcp and ws: a connection is pending until it is authenticated.
 
     connected --> PendingConnection --token, or a family's first bytes--> Host.client
                     `-- too late, too many, wrong: turned away
@@ -79,14 +79,14 @@ class Handshakes:
     def client(
         self,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
+        disconnect: Callable[[], None],
         *,
         ordered: bool,
-        hold: Callable[[bool], None] = lambda _: None,
+        pause_reading: Callable[[bool], None] = lambda _: None,
         name: str = "",
     ) -> PendingConnection:
         """Somebody has connected."""
-        connection = self._kind(self, deliver, hang_up, hold, name, ordered=ordered)
+        connection = self._kind(self, deliver, disconnect, pause_reading, name, ordered=ordered)
         self._pending[connection] = name.rpartition(":")[0]
         if len(self._pending) > PENDING:
             ((most, _),) = Counter(self._pending.values()).most_common(1)
@@ -126,8 +126,8 @@ class PendingConnection(ABC):
         self,
         handshakes: Handshakes,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
-        hold: Callable[[bool], None],
+        disconnect: Callable[[], None],
+        pause_reading: Callable[[bool], None],
         name: str,
         *,
         ordered: bool,
@@ -137,8 +137,8 @@ class PendingConnection(ABC):
         self.authenticator = handshakes.authenticator
         self._handshakes = handshakes
         self._write = deliver
-        self._hang_up = hang_up
-        self._hold = hold
+        self._disconnect = disconnect
+        self._pause_reading = pause_reading
         self._ordered = ordered
         self._away = False
         self._timer: asyncio.TimerHandle | None = None
@@ -163,7 +163,7 @@ class PendingConnection(ABC):
         """Let it in."""
         self._decided()
         peer: Peer = self._handshakes.host.client(
-            self.deliver, self.hang_up, ordered=self._ordered, hold=self._hold, name=self.name
+            self.deliver, self.disconnect, ordered=self._ordered, pause_reading=self._pause_reading, name=self.name
         )
         self.peer = peer
         return peer
@@ -172,16 +172,16 @@ class PendingConnection(ABC):
         """Hang up on somebody who is not let in."""
         if not self._away:
             self.authenticator.refuse(self.name, reason)
-            self.hang_up()
+            self.disconnect()
 
-    def hang_up(self) -> None:
+    def disconnect(self) -> None:
         """End it."""
         if not self._away:
             self.close()
-            self._hang_up()
+            self._disconnect()
 
     def close(self) -> None:
-        """Be deaf from now on."""
+        """Ignores what arrives from now on."""
         self._away = True
         self._decided()
 

@@ -1,6 +1,6 @@
-"""Whose motion it is: one holder at a time may command an arm, until it is gone.
+"""The lease of an arm: one holder at a time may command it, until the holder is gone.
 
-What has to be done for the arm before somebody else may, `leave` does: until that has returned nobody has the lease.
+When a holder is gone, `leave` brings the arm to rest, and nobody has the lease until that has returned.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The line to the arm as a bridge uses it: frames with their answers, and stops that are said until they are heard."""
+"""The line to the arm as a bridge uses it: requests with replies, and stops that are repeated until acknowledged."""
 
 from __future__ import annotations
 

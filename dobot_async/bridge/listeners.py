@@ -1,9 +1,9 @@
-"""Where clients come in, and who is let in: addresses, tokens, TLS.
+"""The listeners of a bridge, and who may connect: addresses, tokens, TLS.
 
     pty          whoever may open the terminal
     tcp          the first line is TOKEN and the token
     udp          any datagram may begin with that line; its sender is then known for a while
-    zenoh        who may is Zenoh's own affair: its access control, TLS, and where it listens
+    zenoh        decided by Zenoh: its access control, TLS, and where it listens
     ws           a header (Authorization: Bearer), ?token= in the URL, or the line as the first text message
 
 A token is needed on every address but this computer's own. Without one a web page must not get through to the arm,
@@ -110,7 +110,7 @@ async def open_listeners(
             elif place.scheme == "udp":
                 known = UDPListener(authenticator)
                 urls.append(
-                    await on_udp(host, stack, address=address, port=port, admit=known.admit, crowded=known.crowded)
+                    await on_udp(host, stack, address=address, port=port, admit=known.admit, on_full=known.on_full)
                 )
             elif place.scheme == "zenoh":
                 from dobot_async.bridge.zenoh import on_zenoh  # noqa: PLC0415 - it needs an extra
@@ -199,9 +199,9 @@ class UDPListener:
             return data
 
         reason = "a wrong token, or none" if authenticator.token else "what it says is nothing that this arm is told"
-        authenticator.refuse("udp", f"a datagram of a stranger: {reason}")
+        authenticator.refuse("udp", f"a datagram of an unauthenticated client: {reason}")
         return None
 
-    def crowded(self, name: str) -> None:
+    def on_full(self, name: str) -> None:
         """One more than there may be has sent something."""
         self._authenticator.refuse(name, f"{MANY} others use this port by udp, which is as many as may")

@@ -1,4 +1,4 @@
-"""Where the requests of a bridge's clients are taken, and what is said of them."""
+"""The requests of a bridge's clients, and the protocol of what handles them."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ from dobot_async.errors import ProtocolError, ReplyTimeout
 __all__ = ["Bridge"]
 
 F = TypeVar("F", bound=Frame)
-FAREWELL = 1.5  # seconds: with the closing of the link that is 2, for who is cancelled
+TEARDOWN = 1.5  # seconds: with the closing of the link that is 2, for who is cancelled
 
 
 class Bridge(Generic[F]):
@@ -75,7 +75,7 @@ class Bridge(Generic[F]):
         self._line = ArmLink(link, family)
         leave = Standstill(self._line, family, self._tell).reach if on_vanish == "stop" else let_finish
         self._lease = Lease(takeover=takeover, leave=leave, cut=self.cut, tell=self._tell)
-        self._farewells: set[asyncio.Task[None]] = set()
+        self._teardowns: set[asyncio.Task[None]] = set()
         link.on_unsolicited.add(self._unasked)
         self._watching = asyncio.create_task(self._watch_link(), name="dobot_async bridge link")
 
@@ -109,14 +109,23 @@ class Bridge(Generic[F]):
     def client(
         self,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
+        disconnect: Callable[[], None],
         *,
         ordered: bool,
-        hold: Callable[[bool], None] = lambda _: None,
+        pause_reading: Callable[[bool], None] = lambda _: None,
         name: str = "",
     ) -> Client[F]:
         """Called by a listener: somebody was let in."""
-        client = Client(self, self.family, deliver, hang_up, hold=hold, name=name, ordered=ordered, limits=self._limits)
+        client = Client(
+            self,
+            self.family,
+            deliver,
+            disconnect,
+            pause_reading=pause_reading,
+            name=name,
+            ordered=ordered,
+            limits=self._limits,
+        )
         self._clients.add(client)
         if self._ended or len(self._clients) > self._limits.clients:
             reason = "the bridge has ended" if self._ended else "there are too many clients"
@@ -132,7 +141,7 @@ class Bridge(Generic[F]):
             return
 
         client.leave()
-        self._begin(self._farewell(client))
+        self._begin(self._teardown(client))
 
     def cut(self, client: Client[F], reason: str) -> None:
         """Ends a connection."""
@@ -161,7 +170,7 @@ class Bridge(Generic[F]):
         try:
             return await self._pass_on(client, request)
         except ReplyTimeout:
-            if self.family.may_be_silent(request.frame):
+            if self.family.ack_optional(request.frame):
                 return None
 
             raise
@@ -176,14 +185,14 @@ class Bridge(Generic[F]):
     async def aclose(self) -> None:
         """Stops the arm if it moves for somebody, and ends everything; takes a few seconds at most."""
         with suppress(TimeoutError):
-            async with asyncio.timeout(FAREWELL):
-                while self._farewells:
-                    await asyncio.wait(self._farewells)
+            async with asyncio.timeout(TEARDOWN):
+                while self._teardowns:
+                    await asyncio.wait(self._teardowns)
 
-        for task in [self._watching, *self._farewells]:
+        for task in [self._watching, *self._teardowns]:
             task.cancel()
 
-        await asyncio.wait([self._watching, *self._farewells])
+        await asyncio.wait([self._watching, *self._teardowns])
         for client in list(self._clients):
             await client.aclose()
 
@@ -253,10 +262,10 @@ class Bridge(Generic[F]):
 
     def _unasked(self, frame: F) -> None:
         """The arm has said something that nobody waits for."""
-        if self._lease.holder and self.family.aside(frame):
+        if self._lease.holder and self.family.is_unsolicited(frame):
             self._lease.holder.tell(bytes(frame))
 
-    async def _farewell(self, client: Client[F]) -> None:
+    async def _teardown(self, client: Client[F]) -> None:
         """Ends the lease of a client that has gone, and lets its last requests end."""
         try:
             await self._lease.end(client)
@@ -268,9 +277,9 @@ class Bridge(Generic[F]):
 
     def _begin(self, work: Coroutine[Any, Any, None]) -> None:
         """Begins with what the end of the bridge waits for."""
-        task = asyncio.create_task(work, name="dobot_async bridge farewell")
-        self._farewells.add(task)
-        task.add_done_callback(self._farewells.discard)
+        task = asyncio.create_task(work, name="dobot_async bridge teardown")
+        self._teardowns.add(task)
+        task.add_done_callback(self._teardowns.discard)
 
     async def _watch_link(self) -> None:
         """Tells when the link to the arm breaks and comes back."""

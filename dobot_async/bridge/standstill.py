@@ -1,4 +1,4 @@
-"""The end of a client that may move the arm: an arm in the middle of a motion is stopped, until it is seen to stand."""
+"""The end of a lease holder: an arm in the middle of a motion is stopped, until it is seen at rest."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ class Standstill(Generic[F]):
         off = holder.watch.off()
         final = not family.proves_stop
         for attempt in itertools.count():
-            frames = [*(family.stopping if attempt < GENTLY else family.insisting), *off]
+            frames = [*(family.stopping if attempt < GENTLY else family.escalated_stop), *off]
             answered = await self._line.stop(frames)
             told = attempt > GENTLY or all(
-                heard or family.may_be_silent(frame) for heard, frame in zip(answered, frames, strict=True)
+                heard or family.ack_optional(frame) for heard, frame in zip(answered, frames, strict=True)
             )
             obeys = answered[0] if family.proves_stop else await self._is_seen_to_stand(holder, frames, answered)
             if final and obeys and told:

@@ -62,9 +62,9 @@ async def bridge(
         ConnectFailed: No arm answered, or it cannot listen there.
     """
     known = family_of(family)
-    unknown = set(deny) - known.denials.keys()
+    unknown = set(deny) - known.deny_groups.keys()
     if unknown or on_vanish not in {"stop", "leave"}:
-        raise ValueError(f'expected deny to be of {", ".join(known.denials)}, and on_vanish "stop" or "leave"')
+        raise ValueError(f'expected deny to be of {", ".join(known.deny_groups)}, and on_vanish "stop" or "leave"')
 
     limits = limits or Limits()
     listeners = Listeners.of([listen] if isinstance(listen, str) else listen, token, certificate, key, origins)
@@ -81,7 +81,7 @@ async def bridge(
             known,
             takeover=takeover,
             on_vanish=on_vanish,
-            denied={each for group in deny for each in known.denials[group]},
+            denied={each for group in deny for each in known.deny_groups[group]},
             limits=limits,
         )
         stack.push_async_callback(lambda: run_shielded(running.aclose()))

@@ -32,11 +32,11 @@ class WebSocketConnection(PendingConnection):
         self,
         handshakes: Handshakes,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
+        disconnect: Callable[[], None],
         *rest: Any,
         **more: Any,
     ) -> None:
-        super().__init__(handshakes, deliver, hang_up, *rest, **more)
+        super().__init__(handshakes, deliver, disconnect, *rest, **more)
         library = websockets("server")
         self._opcodes = websockets("frames").Opcode
         self._socket = library.ServerProtocol(max_size=BIGGEST_MESSAGE, logger=quiet())
@@ -70,16 +70,16 @@ class WebSocketConnection(PendingConnection):
             self._socket.send_binary(data)
             self._flush()
 
-    def hang_up(self) -> None:
+    def disconnect(self) -> None:
         """Say that it ends, and end it; what it has not read is lost with it."""
         if self._accepted and not self._away:
             self._socket.fail(ENDED, "the bridge has ended this connection")
             self._written()
 
-        super().hang_up()
+        super().disconnect()
 
     def close(self) -> None:
-        """Be deaf from now on."""
+        """Ignores what arrives from now on."""
         super().close()
         if self._ping:
             self._ping.cancel()
@@ -140,7 +140,7 @@ class WebSocketConnection(PendingConnection):
     def _look(self) -> None:
         """Ask whether it is still there, from time to time; end it if it is not."""
         if self._loop.time() > self._heard + PING + PONG_WITHIN:
-            PendingConnection.hang_up(self)
+            PendingConnection.disconnect(self)
             return
 
         self._ping = self._loop.call_later(PING, self._look)
@@ -164,7 +164,7 @@ class WebSocketConnection(PendingConnection):
     def _end(self) -> None:
         """The WebSocket has ended, in good order or for a breach of its rules."""
         if self.peer:
-            PendingConnection.hang_up(self)
+            PendingConnection.disconnect(self)
         else:
             self.turn_away("no request for a WebSocket, or one that ends at once")
 

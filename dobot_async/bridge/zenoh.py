@@ -41,7 +41,7 @@ HELD = 65_536
 GIVES_WAY = 1.0  # seconds until one of two that began at the same time has taken its token back
 PRESENT = 1024  # tokens of clients that are kept; those of clients that are let in always
 CHUNK = re.compile(r"[^*$/]{1,64}")
-STRANGERS = 100  # answers a second to those who are no clients, all together
+UNAUTHENTICATED = 100  # answers a second to those who are no clients, all together
 LONGEST_NAME, LONGEST_INTRODUCTION = 80, 1024
 EVERYWHERE = {"/0.0.0.0:": "/127.0.0.1:", "/[::]:": "/[::1]:"}
 
@@ -95,7 +95,7 @@ class ZenohListener:
         self._present: dict[str, None] = {}
         self._connections: dict[str, ZenohConnection] = {}
         self._leaving: set[asyncio.Task[None]] = set()
-        self._told = Allowance(STRANGERS, asyncio.get_running_loop().time)
+        self._told = Allowance(UNAUTHENTICATED, asyncio.get_running_loop().time)
         self._token: zenoh.LivelinessToken | None = None
 
     async def open(self) -> None:
@@ -146,7 +146,7 @@ class ZenohListener:
             self.bridge.leave(connection.peer)
             connection.outbox.end(why)
             leaving = asyncio.create_task(
-                connection.outbox.aclose(), name=f"dobot_async zenoh farewell {connection.name}"
+                connection.outbox.aclose(), name=f"dobot_async zenoh teardown {connection.name}"
             )
             self._leaving.add(leaving)
             leaving.add_done_callback(self._leaving.discard)
@@ -176,7 +176,7 @@ class ZenohListener:
         )
 
     def _weigh(self, message: tuple[str, bytes]) -> tuple[str, int]:
-        """Whose share of the way in a message takes: strangers, who may call themselves anything, have one together."""
+        """The sender whose share of the input a message takes; all peers that are no clients share one."""
         name, data = message
         return name if name in self._connections else "", len(data)
 
@@ -248,7 +248,9 @@ class ZenohConnection:
         self._numbers = Numbered()
         self._held = False
         self._waiting = bytearray()
-        self.peer = listener.bridge.client(self.outbox.send, self._hang_up, ordered=True, hold=self._hold, name=shown)
+        self.peer = listener.bridge.client(
+            self.outbox.send, self._disconnect, ordered=True, pause_reading=self._pause_reading, name=shown
+        )
 
     def send(self, message: bytes) -> None:
         """It has sent something."""
@@ -264,11 +266,11 @@ class ZenohConnection:
             if len(self._waiting) > HELD:
                 self._listener.cut(self, "it sends more than it may")
 
-    def _hang_up(self) -> None:
+    def _disconnect(self) -> None:
         """Ends its connection soon."""
         asyncio.get_running_loop().call_soon(self._listener.leave, self, "the bridge has ended this connection")
 
-    def _hold(self, held: bool) -> None:
+    def _pause_reading(self, held: bool) -> None:
         """Keeps what it sends, or passes it on again."""
         self._held = held
         self._pass_on()

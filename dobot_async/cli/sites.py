@@ -1,4 +1,4 @@
-"""Which arms a server gives to others, and within which limits: the options of `mcp` and `mqtt`."""
+"""The arms that a server shares, and their limits: the options of `mcp` and `mqtt`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which arms there are to find: their USB chips, and how each is asked who it is.
+"""The families that can be discovered: their USB chips, and the probe that identifies each.
 
 A USB id is that of the chip between USB and the arm's board, not of the arm: several families use the same ones, and so
 do many other devices. Only a probe tells what is behind it.

@@ -1,4 +1,4 @@
-"""What a search finds, and what a source of arms is."""
+"""The results of a search, and the protocol of its sources."""
 
 from __future__ import annotations
 

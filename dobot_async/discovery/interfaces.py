@@ -1,4 +1,4 @@
-"""Where a broadcast has to be sent so that each network of this computer hears it."""
+"""The broadcast address of each network of this computer."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import struct
 import sys
 from contextlib import suppress
 
-__all__ = ["EVERYBODY", "ways_out"]
+__all__ = ["EVERYBODY", "broadcast_targets"]
 
 ANY, EVERYBODY = "0.0.0.0", "255.255.255.255"  # noqa: S104 - answers come to whatever address asked
 SIOCGIFFLAGS, SIOCGIFBRDADDR = 0x8913, 0x8919
@@ -15,7 +15,7 @@ UP, BROADCAST = 0x1, 0x2
 LINUX = sys.platform == "linux"
 
 
-def ways_out() -> list[tuple[str, str]]:
+def broadcast_targets() -> list[tuple[str, str]]:
     """Returns pairs of an address to bind to and a broadcast address, one for each IPv4 network.
 
     Linux tells the broadcast address of each interface. Elsewhere everybody is asked from each address of this

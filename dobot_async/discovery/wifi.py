@@ -16,7 +16,7 @@ from ipaddress import IPv4Address
 from typing import Any
 
 from dobot_async.discovery.found import Found, printable
-from dobot_async.discovery.interfaces import ANY, ways_out
+from dobot_async.discovery.interfaces import ANY, broadcast_targets
 
 __all__ = ["PORT", "QUESTION", "WiFiModules"]
 
@@ -47,7 +47,9 @@ class WiFiModules:
         Raises:
             OSError: Nobody could be asked.
         """
-        ways = [(ANY, target) for target in self._broadcast] or [(own, (target, PORT)) for own, target in ways_out()]
+        ways = [(ANY, target) for target in self._broadcast] or [
+            (own, (target, PORT)) for own, target in broadcast_targets()
+        ]
         if not ways:
             raise OSError("this computer is in no IPv4 network")
 

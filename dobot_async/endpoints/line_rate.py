@@ -83,15 +83,15 @@ class RateLimitedPeer(Generic[P]):
         self,
         baud: float,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
-        hold: Callable[[bool], None],
+        disconnect: Callable[[], None],
+        pause_reading: Callable[[bool], None],
         leave: Callable[[P], None],
     ) -> None:
         self.back = RateLimitedLine(baud, deliver)
         self.peer: P | None = None
         self._there = RateLimitedLine(baud, self._arrived)
-        self._hang_up = hang_up
-        self._hold = hold
+        self._disconnect = disconnect
+        self._pause_reading = pause_reading
         self._leave = leave
         self._held = False
         self._open = True
@@ -106,11 +106,11 @@ class RateLimitedPeer(Generic[P]):
         self._there.send(data)
         self._flow()
 
-    def hang_up(self) -> None:
+    def disconnect(self) -> None:
         """End the client; what it has sent and has not arrived is lost."""
         self._there.clear()
         if self._open:
-            self._hang_up()
+            self._disconnect()
         else:
             self._left()
 
@@ -140,7 +140,7 @@ class RateLimitedPeer(Generic[P]):
         held = self._there.backlog >= AHEAD
         if held != self._held:
             self._held = held
-            self._hold(held)
+            self._pause_reading(held)
 
 
 class RateLimited(Generic[P]):
@@ -158,15 +158,15 @@ class RateLimited(Generic[P]):
     def client(
         self,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
+        disconnect: Callable[[], None],
         *,
         ordered: bool,
-        hold: Callable[[bool], None] = lambda _: None,
+        pause_reading: Callable[[bool], None] = lambda _: None,
         name: str = "",
     ) -> RateLimitedPeer[P]:
         """Connect somebody; see `Host`."""
-        wired: RateLimitedPeer[P] = RateLimitedPeer(self._baud, deliver, hang_up, hold, self._host.leave)
-        wired.peer = self._host.client(wired.answer, wired.hang_up, ordered=ordered, name=name)
+        wired: RateLimitedPeer[P] = RateLimitedPeer(self._baud, deliver, disconnect, pause_reading, self._host.leave)
+        wired.peer = self._host.client(wired.answer, wired.disconnect, ordered=ordered, name=name)
         return wired
 
     def leave(self, client: RateLimitedPeer[P]) -> None:

@@ -41,19 +41,19 @@ class Host(Protocol[P]):
     def client(
         self,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
+        disconnect: Callable[[], None],
         *,
         ordered: bool,
-        hold: Callable[[bool], None] = ...,
+        pause_reading: Callable[[bool], None] = ...,
         name: str = ...,
     ) -> P:
         """Called when somebody has connected.
 
         Args:
             deliver: Sends bytes to the client; what it does not read may get lost.
-            hang_up: Ends the connection, as far as there is one; `leave` follows.
+            disconnect: Ends the connection, as far as there is one; `leave` follows.
             ordered: Whether its bytes arrive in their order, as they do on all but datagrams.
-            hold: Called with True it lets the client wait, with False go on; datagrams get lost instead.
+            pause_reading: Called with True it lets the client wait, with False go on; datagrams get lost instead.
             name: Who it is, for people.
         """
         ...
@@ -113,12 +113,12 @@ async def on_udp(
     address: str,
     port: int,
     admit: Callable[[bytes, bool], bytes | None] = lambda data, _known: data,
-    crowded: Callable[[str], None] | None = None,
+    on_full: Callable[[str], None] | None = None,
 ) -> str:
     """A UDP port, as the arm's Wi-Fi has it; returns its URL. See `DatagramEndpoint`."""
     loop = asyncio.get_running_loop()
     transport, _ = await loop.create_datagram_endpoint(
-        lambda: DatagramEndpoint(host, admit=admit, crowded=crowded), local_addr=(address, port)
+        lambda: DatagramEndpoint(host, admit=admit, on_full=on_full), local_addr=(address, port)
     )
     stack.callback(transport.close)
     return url_of("udp", transport.get_extra_info("sockname"))
@@ -157,7 +157,7 @@ class ClientConnection(asyncio.Protocol, Generic[P]):
         self._held = self._full = False
         connection = transport.get_extra_info("socket")
         keep_alive(connection)
-        self._watch = PeerWatch(connection, lambda _: self._hang_up())
+        self._watch = PeerWatch(connection, lambda _: self._disconnect())
         name = url_of(self._port.scheme, transport.get_extra_info("peername") or ("?", 0))
         if self._port.tls:
             agree = self._loop.start_tls(
@@ -167,7 +167,9 @@ class ClientConnection(asyncio.Protocol, Generic[P]):
             self._handshake.add_done_callback(self._agreed)
             self._port.handshakes.add(self._handshake)
 
-        self._client = self._port.host.client(self._write, self._hang_up, ordered=True, hold=self._hold, name=name)
+        self._client = self._port.host.client(
+            self._write, self._disconnect, ordered=True, pause_reading=self._pause_reading, name=name
+        )
 
     def data_received(self, data: bytes) -> None:
         """It has sent something."""
@@ -215,13 +217,13 @@ class ClientConnection(asyncio.Protocol, Generic[P]):
         if not self._handshake and not self._lost:
             self._transport.write(data)
 
-    def _hang_up(self) -> None:
+    def _disconnect(self) -> None:
         if self._handshake:
             self._handshake.cancel()
         else:
             self._transport.abort()
 
-    def _hold(self, held: bool) -> None:
+    def _pause_reading(self, held: bool) -> None:
         self._held = held
         self._flow()
 
@@ -242,7 +244,7 @@ class DatagramEndpoint(asyncio.DatagramProtocol, Generic[P]):
         host: Who is reached.
         admit: Called with each datagram, and whether its sender is known; returns what the host gets of it, None for
             nothing, which makes nobody a client.
-        crowded: Called with who is ignored because there are enough; None lets one more take the place of the first.
+        on_full: Called with who is ignored because there are enough; None lets one more take the place of the first.
     """
 
     def __init__(
@@ -250,11 +252,11 @@ class DatagramEndpoint(asyncio.DatagramProtocol, Generic[P]):
         host: Host[P],
         *,
         admit: Callable[[bytes, bool], bytes | None] = lambda data, _: data,
-        crowded: Callable[[str], None] | None = None,
+        on_full: Callable[[str], None] | None = None,
     ) -> None:
         self._host = host
         self._admit = admit
-        self._crowded = crowded
+        self._on_full = on_full
         self._clients: dict[Any, P] = {}
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -269,8 +271,8 @@ class DatagramEndpoint(asyncio.DatagramProtocol, Generic[P]):
 
         if addr not in self._clients:
             if len(self._clients) == MANY:
-                if self._crowded:
-                    self._crowded(url_of("udp", addr))
+                if self._on_full:
+                    self._on_full(url_of("udp", addr))
                     return
 
                 self._forget(next(iter(self._clients)))

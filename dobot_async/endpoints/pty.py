@@ -51,10 +51,12 @@ class PseudoTerminal(Generic[P]):
         self.path = os.ttyname(self._slave)
         self._unsent = bytearray()
         self._client: P | None = None
-        self._deaf = False
+        self._ignoring = False
         self._timer: asyncio.TimerHandle | None = None
         if lasting:
-            self._client = host.client(self._deliver, self.close, ordered=True, hold=self._hold, name=self.path)
+            self._client = host.client(
+                self._deliver, self.close, ordered=True, pause_reading=self._pause_reading, name=self.path
+            )
             self._loop.add_reader(self._master, self._readable)
         else:
             os.close(self._slave)
@@ -83,8 +85,10 @@ class PseudoTerminal(Generic[P]):
             self._timer = self._loop.call_later(LOOK, self._look)
             return
 
-        self._deaf = False
-        self._client = self._host.client(self._deliver, self._ignore, ordered=True, hold=self._hold, name=self.path)
+        self._ignoring = False
+        self._client = self._host.client(
+            self._deliver, self._ignore, ordered=True, pause_reading=self._pause_reading, name=self.path
+        )
         self._loop.add_reader(self._master, self._readable)
         if data:
             self._client.send(data)
@@ -101,7 +105,7 @@ class PseudoTerminal(Generic[P]):
             self._closed()
             return
 
-        if self._client and not self._deaf:
+        if self._client and not self._ignoring:
             self._client.send(data)
 
     def _closed(self) -> None:
@@ -122,12 +126,12 @@ class PseudoTerminal(Generic[P]):
             self._host.leave(client)
 
     def _ignore(self) -> None:
-        """A port cannot be hung up without losing its name: it stays mute until the client closes it."""
-        self._deaf = True
-        self._hold(False)
+        """A port cannot be closed from here without losing its name: input is ignored until the client closes it."""
+        self._ignoring = True
+        self._pause_reading(False)
         self._gone()
 
-    def _hold(self, held: bool) -> None:
+    def _pause_reading(self, held: bool) -> None:
         """Lets the client wait. While it does, its end goes unnoticed; it is let go on again in any case."""
         if self._master >= 0:
             if held:

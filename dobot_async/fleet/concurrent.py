@@ -1,6 +1,6 @@
-"""Several things at once, each for one arm.
+"""Concurrent work, one coroutine for each arm.
 
-All end before this returns. Of several failures one is told: the first of which the others are a consequence.
+All end before this returns. Of several failures the one that caused the others is raised.
 """
 
 from __future__ import annotations

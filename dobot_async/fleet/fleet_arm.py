@@ -1,4 +1,4 @@
-"""One arm in its fleet: what it may send, what it holds, and what becomes of the fleet when it fails."""
+"""One arm in its fleet: admission of its motions, the zones that it holds, and the consequences of its failure."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class FleetArm:
                 limits=FleetLimits(self.name, member.limits, member.base),
             )
             if options.get("queue") == "keep" and self.commands:
-                await guard.glimpse()
+                await guard.assume_anywhere()
                 self._follower.leave(guard, lambda: self.family.leftovers(arm))
             else:
                 await guard.locate()

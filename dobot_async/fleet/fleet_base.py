@@ -1,7 +1,7 @@
-"""What holds a fleet together: the tasks that hold its connections, and what happens when an arm fails.
+"""The connections of a fleet, one task each, and what stops when an arm fails.
 
-Each arm has a task of its own in which its connection's block is entered and left, so that nothing is held open across
-the caller's code, and his exceptions reach him as they are.
+Each arm has a task of its own in which its connection's block is entered and left, so that no context is held open
+across the caller's code, and the caller's exceptions arrive unchanged.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Finds out what becomes of what an arm was told, though nobody may await it."""
+"""Watches the motions of an arm to their end, also those that no program awaits."""
 
 from __future__ import annotations
 

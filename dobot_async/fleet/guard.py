@@ -1,12 +1,12 @@
-"""Keeps one arm out of zones that others hold: looks at each way before it is sent, and holds what is on it.
+"""Keeps one arm out of zones that others hold: plans each motion before it is sent, and holds the zones on its path.
 
     put --> plan (planner) --> zones on it --request--> enter --> sent --> done --> the zones behind are released
 
 The arm holds a zone from before a motion into it is sent until the arm is known to stand outside, so that two guarded
-arms are never in one zone, whatever programs do. Where it may be is found out in `whereabouts`; each way of one that
-was switched off and on may lead anywhere in its reach, until it was homed.
+arms are never in one zone, whatever programs do. Where it may be, `zone_tracker` knows; the path of an un-homed arm
+may lead anywhere in its reach.
 
-What is looked at is the tool's place; `clearance` is for what is around it.
+Paths are those of the tool centre point; `clearance` is for what is around it.
 """
 
 from __future__ import annotations

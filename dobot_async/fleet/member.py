@@ -1,4 +1,4 @@
-"""What a fleet is told of an arm before it is connected."""
+"""The description of an arm before its fleet connects it."""
 
 from __future__ import annotations
 

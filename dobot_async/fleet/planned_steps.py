@@ -1,4 +1,4 @@
-"""What an arm has to do, and where that leads."""
+"""The planned steps of an arm, with the zones that they lead through."""
 
 from __future__ import annotations
 

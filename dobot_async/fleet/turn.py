@@ -1,4 +1,4 @@
-"""Whose turn it is to command an arm: one program after the other, in the order in which they come."""
+"""The turn to command an arm: one program after the other, in the order of their requests."""
 
 from __future__ import annotations
 

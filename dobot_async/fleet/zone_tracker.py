@@ -1,16 +1,15 @@
-"""Where one arm may be, and the zones that it holds for that.
+"""The zones that one arm may be in, and so has to hold.
 
     enter --> steps --> each done: what is behind is released
     jogs, homing, leftovers: all within its reach, until it rests --locate--> where it stands
 
 1. Where the arm may be is `standing`, the zones of all steps that have not ended, and everything in its reach while it
    is on a way that is not known: homing, jogs, and what an earlier program has left in its queue.
-2. It is read from the arm alone, when no step is left and the arm has heard its stop and rests.
-3. An arm without anything to do is looked at again before its next motion: it may have been switched off, or led by
-   hand.
+2. It is read from the arm only when no step is left and the arm has acknowledged its stop and rests.
+3. The pose of an idle arm is read again before its next motion: it may have been switched off, or guided by hand.
 4. An arm that was switched off and on does not know where it is: it may be anywhere in its reach until it was homed.
-5. Whatever ends, a step, a jog or a look, all requests are judged anew: an arm that does not tell where it stands keeps
-   what it holds, and yet it rests. It is asked again until it tells.
+5. When a step, a jog or a reading ends, all requests are decided again: an arm whose pose cannot be read keeps its
+   zones, and yet it rests. It is read again until it answers.
 """
 
 from __future__ import annotations
@@ -80,7 +79,7 @@ class ZoneTracker(Generic[S]):
         self._standing: frozenset[str] = frozenset()
         self._located = False
         self._loose: list[frozenset[str]] = []  # where the arm may be by what is no step: jogs, leftovers, changes
-        self._mute = False  # whether it did not tell where it is when it was asked last
+        self._silent = False  # whether it did not tell where it is when it was asked last
         self._looking = 0
         self._plans = 0
         holder.moving = lambda: bool(steps or self._loose or self._looking)
@@ -105,7 +104,7 @@ class ZoneTracker(Generic[S]):
             self._plans += 1
             self._stance = course.end
 
-    async def glimpse(self) -> None:
+    async def assume_anywhere(self) -> None:
         """Take the arm to go anywhere in its reach, from now on until `until` has ended."""
         await self._planner.look()
         self._loose.append(self._anywhere())
@@ -157,12 +156,12 @@ class ZoneTracker(Generic[S]):
         """Find out where the arm stands once it does; raise DobotError if it does not tell."""
         plans = self._plans
         self._looking += 1
-        self._mute = True
+        self._silent = True
         try:
             await self._queue.stops_heard()
             await self._rest()
             stance = await self._planner.look()
-            self._mute = False
+            self._silent = False
             if plans == self._plans and not self._loose:
                 self._stands(stance)
         finally:
@@ -172,7 +171,7 @@ class ZoneTracker(Generic[S]):
     @property
     def is_sought(self) -> bool:
         """Whether the arm rests somewhere that it is still to be asked about. One that has failed is asked once."""
-        return not (self._located or self._busy or (self._mute and self._holder.failure))
+        return not (self._located or self._busy or (self._silent and self._holder.failure))
 
     @property
     def _busy(self) -> bool:

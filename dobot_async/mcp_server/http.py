@@ -37,7 +37,7 @@ PATH = "/mcp"
 LARGEST = 1 << 20  # bytes of a request
 CONNECTIONS, SESSIONS = 64, 16
 IDLE = 600.0  # seconds until a session that asks nothing is forgotten
-FAREWELL = 1  # seconds for which open connections are waited for at the end
+TEARDOWN = 1  # seconds for which open connections are waited for at the end
 AHEAD = 4  # messages of a request that are taken before they are wanted
 
 
@@ -214,7 +214,7 @@ def config_of(app: ASGIApp, certificate: str | Path | None, key: str | Path | No
         access_log=False,
         server_header=False,
         limit_concurrency=CONNECTIONS,
-        timeout_graceful_shutdown=FAREWELL,
+        timeout_graceful_shutdown=TEARDOWN,
         **tls,
     )
 

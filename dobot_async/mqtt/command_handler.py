@@ -1,14 +1,14 @@
-"""The commands for one arm: who may give them, which were given already, and what became of each.
+"""The commands for one arm: which session may send them, which were executed already, and their results.
 
     message --> JSON, session, id --> known id? the same reply again
-                                      stop            anybody, at once; it ends the lease of who has it
+                                      stop            any session, at once; it ends the lease
                                       take_lease      for some seconds; taken again it goes on
                                       release_lease
-                                      an action       for who has the lease
+                                      an action       for the holder of the lease
 
-A session is whatever says its name: nothing but the broker's access control tells one from another. It is gone when its
-lease was not taken again in time, when it gives it back, when somebody else stops the arm, and when the broker is lost.
-What it had the arm do is ended then, before anybody else gets the lease.
+A session is identified by its name alone; only the broker's access control separates sessions. It ends when its lease
+expires or is released, when another session stops the arm, and when the broker is lost. Its motions are ended then,
+before another session gets the lease.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class CommandHandler:
             if key is None or not self._known(session, str(key)):
                 self._start(self._answered(session, key, self._served(session, given)), session, given.get("do"))
         except ValueError as error:
-            self._reply(session, {"id": None, "ok": False, "error": told_of(error)})
+            self._reply(session, {"id": None, "ok": False, "error": error_body(error)})
 
     def lose(self) -> None:
         """The broker is lost: who has the lease cannot be heard any more."""
@@ -184,7 +184,7 @@ class CommandHandler:
         try:
             told = {"id": key, "ok": True, "value": await work}
         except (DobotError, ValueError, TypeError, ImportError, Refused) as error:
-            told = {"id": key, "ok": False, "error": told_of(error)}
+            told = {"id": key, "ok": False, "error": error_body(error)}
         except asyncio.CancelledError:
             ended = {"kind": "MotionStopped", "text": "the lease has ended, and the arm was told to stop"}
             self._finish(session, key, {"id": key, "ok": False, "error": ended})
@@ -230,7 +230,7 @@ class CommandHandler:
         self._changed()
 
 
-def keep(_party: MqttSession, _reason: str) -> None:
+def keep(_session: MqttSession, _reason: str) -> None:
     """Nobody takes a lease from who has it, so nobody is cut off."""
 
 
@@ -287,7 +287,7 @@ def only(given: Mapping[str, Any], *names: str) -> None:
         raise ValueError(f"{given['do']} has no {', '.join(map(ascii, sorted(more)))}")
 
 
-def told_of(error: BaseException) -> dict[str, str]:
+def error_body(error: BaseException) -> dict[str, str]:
     """What is said of an error."""
     text = "; ".join([str(error), *getattr(error, "__notes__", ())])
     return {"kind": type(error).__name__, "text": printable(text, 1000)}

@@ -1,4 +1,4 @@
-"""What Home Assistant is told of an arm: one device with its entities, by device-based MQTT discovery.
+"""The discovery message of an arm for Home Assistant: one device with its entities.
 
 A button sends a new id with each press, so that a message that is delivered twice is obeyed once.
 """

@@ -1,4 +1,4 @@
-"""Who may come in: tokens and roles, the names under which this server is called, and what a browser is told to allow.
+"""Access control: tokens and roles, the host names of this server, and the security headers for browsers.
 
     GET /?token=T --right--> cookie: HttpOnly, SameSite=Strict, one for each port
     every request --Host, Origin, Sec-Fetch-Site--> cookie --> Role

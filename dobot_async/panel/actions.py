@@ -12,7 +12,7 @@ from dobot_async.panel import motion_actions as motions
 from dobot_async.panel import tool_actions as tools
 from dobot_async.panel.arm_tasks import ArmTask
 from dobot_async.panel.arms import ArmView
-from dobot_async.panel.requests import PageRequest, PanelAction, told_of_tools, verb
+from dobot_async.panel.requests import PageRequest, PanelAction, switch_tool, verb
 
 __all__ = ["ACTIONS"]
 
@@ -66,8 +66,8 @@ ACTIONS: Mapping[str, PanelAction] = {
     "release_lease": PanelAction(release_lease, lease="may"),
     "home": verb("home", lambda view: view.arm.home()),
     "recover": PanelAction(recover),
-    "pause": PanelAction(partial(told_of_tools, text="pause", do=lambda view: view.arm.pause())),
-    "resume": PanelAction(partial(told_of_tools, text="resume", do=lambda view: view.arm.resume())),
+    "pause": PanelAction(partial(switch_tool, text="pause", do=lambda view: view.arm.pause())),
+    "resume": PanelAction(partial(switch_tool, text="resume", do=lambda view: view.arm.resume())),
     "power": verb("power", lambda view: view.power()),
     "move_to": PanelAction(motions.move_to),
     "move_joints": PanelAction(motions.move_joints),

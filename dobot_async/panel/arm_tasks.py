@@ -1,11 +1,10 @@
-"""What an arm does for this panel: each command is a task, so that whatever ends the task ends the motion.
+"""The tasks of one arm of a panel: each command is a task, so that ending the task ends the motion.
 
-    ArmTasks.start --> Work (a task) --> the driver's verb, which stops the arm if it is cancelled
+    ArmTasks.start --> ArmTask --> the driver's verb, which stops the arm if it is cancelled
     ArmTasks.end   --> all of them cancelled and joined: the arm was told to stop before this returns
 
-The driver's queue keeps the order in which they were begun. What has the arm for itself (a jog, a following, a drawing,
-something that is played) begins when nothing else is under way, and nothing else begins beside it but what says that it
-may.
+The driver's queue keeps the order in which they began. An exclusive task (a jog, a following, a drawing, a playback)
+begins only when no other one runs, and only tasks marked `beside` begin while it runs.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a page asks for that has to do with files: the list that is taught, and drawings."""
+"""The actions of a page on files: the taught list, and drawings."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Hold to move: an arm moves as long as beats come from a page, by this computer's clock.
+"""Hold to run: an arm moves as long as beats arrive from a page, by this computer's clock.
 
     Ticks.number --tick--> page --beat, with the newest tick--> HoldToRun.beat        each moves the end on
                                                                  HoldToRun.over        "released", "no beat", ...
 
-1. A beat counts if the tick that it brings back was sent at most `PATIENCE` ago: what a network has kept back for
-   longer tells nothing of the hand that holds now.
-2. A hold is over when no beat that counts has come for `PATIENCE`, or when it is ended. After that nothing revives it.
+1. A beat counts if the tick in it was sent at most `PATIENCE` ago: a beat that the network delayed for longer does not
+   prove that the operator still holds.
+2. A hold ends when no valid beat has arrived for `PATIENCE`, or when it is ended; no later beat revives it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Whose arm it is: one operator at a time moves it, or the program that runs beside the panel.
+"""The lease of a panel's arm: one operator at a time moves the arm, or the program that runs beside the panel.
 
-As the lease of a bridge, between pages: who has it keeps it until it gives it back, or its connection ends, or
-somebody takes over, which everybody sees. What it has under way then ends first, and the arm stands.
+A holder keeps the lease until it releases it, its connection ends, or another operator takes over, which all pages are
+shown. The holder's motions end first: nobody gets the lease before the arm stands.
 """
 
 from __future__ import annotations

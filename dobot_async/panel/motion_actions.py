@@ -1,4 +1,4 @@
-"""What a page asks for that moves the arm: places, joints, steps; jogs and followings, while a hand holds."""
+"""The actions of a page that move the arm: targets, joints, steps; jogs and followings while the operator holds."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""What is read from an arm while somebody looks: one reading for all, and the line left to others half of the time.
+"""Polls an arm while a page is connected: once for all pages, leaving half of the line's time to other requests.
 
     pose     at most 20 a second            alarms, link    once a second
-    inputs   twice a second, those that somebody wants to see
+    inputs   twice a second, those that a page shows
 
-Nothing is asked while nobody looks.
+Nothing is polled while no page is connected.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the panel refuses, and how a page is told of what went wrong: a kind for its code, and words for people."""
+"""Refusals of the panel, and errors as a page gets them: a kind for its code, and a text for people."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""One message of a page, and what can be done with it.
+"""A request of a page, and the actions that requests name.
 
-An action reads its arguments at once, so that what is wrong is told before anything is done, and returns a value, or
-what is to be awaited. A motion is a `ArmTask` of its arm.
+An action checks its arguments before it does anything, and returns a value or an awaitable. A motion is an `ArmTask` of
+its arm.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dobot_async.panel.session import PageSession
     from dobot_async.panel.station import Station
 
-__all__ = ["PageRequest", "PanelAction", "told_of_tools", "verb"]
+__all__ = ["PageRequest", "PanelAction", "switch_tool", "verb"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def verb(text: str, do: Callable[[ArmView], Coroutine[Any, Any, Any]]) -> PanelA
     return PanelAction(lambda call: call.work(text, lambda view, _: do(view)))
 
 
-def told_of_tools(
+def switch_tool(
     call: PageRequest, text: str, do: Callable[[ArmView], Coroutine[Any, Any, Any]]
 ) -> Coroutine[Any, Any, Any]:
     """Switch something, also beside a jog, and tell everybody."""

@@ -33,7 +33,7 @@ STOPPED = {"kind": "stopped", "text": "it was stopped before it was done"}
 
 
 class PageSession:
-    """See the module; a `Party` of leases.
+    """See the module; a `Operator` of leases.
 
     Attributes:
         state: What it shares with others.

@@ -1,6 +1,6 @@
 """Starts a panel: access first, then the port, then the arms; ends it in the other order.
 
-panel(arm | fleet | members) --> Sources --> Desk (stations, sessions) --> Web --> port
+panel(arm | fleet | members) --> Sources --> PanelState (stations, sessions) --> Web --> port
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ class Panel:
 
 
 class Program:
-    """The program that runs beside a panel, as a `Party` of leases."""
+    """The program that runs beside a panel, as a `Operator` of leases."""
 
     def __init__(self) -> None:
         self.name = "the program"

@@ -1,4 +1,4 @@
-"""What all sessions of a panel share: its arms, its files, its ticks, and who looks."""
+"""The state that all sessions of a panel share: arms, files, ticks, and which pages are connected."""
 
 from __future__ import annotations
 

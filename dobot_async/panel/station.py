@@ -1,7 +1,7 @@
-"""One arm of the panel: how it is reached, whose it is, what it does, and what everybody is told of it.
+"""One arm of the panel: its connection, its lease, its tasks, and the status that all pages get.
 
-    run: connected? --> Watch (reads, while somebody looks)
-                        Lease --> Works (tasks that move it)
+    run: connected? --> ArmPoller (reads, while a page is connected)
+                        OperatorLease --> ArmTasks (tasks that move it)
                         stop: anybody's, ahead of everything
 
 An arm that the panel has connected itself is connected anew when its link is lost. One that belongs to a program is

@@ -1,4 +1,4 @@
-"""What an arm is taught from a page: a list of steps that is taken, put in order, changed, played, kept and loaded."""
+"""The list of taught steps of one arm: recorded, ordered, edited, played, saved and loaded from a page."""
 
 from __future__ import annotations
 

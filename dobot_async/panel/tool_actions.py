@@ -1,4 +1,4 @@
-"""What a page asks for that switches something: tools, pins, belts, the laser; and what is said of the arm."""
+"""The actions of a page that switch something: tools, pins, belts, the laser; and settings of the arm."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from dobot_async.panel.arm_tasks import ArmTask
 from dobot_async.panel.arms import ArmView
 from dobot_async.panel.problems import PanelRefusal
-from dobot_async.panel.requests import PageRequest, told_of_tools
+from dobot_async.panel.requests import PageRequest, switch_tool
 
 __all__ = [
     "arm_laser",
@@ -45,43 +45,43 @@ def laser(call: PageRequest) -> Coroutine[Any, Any, Any]:
     if on:
         call.station.check_armed()
 
-    return told_of_tools(call, f"laser {'on' if on else 'off'}", lambda view: view.laser(on=on))
+    return switch_tool(call, f"laser {'on' if on else 'off'}", lambda view: view.laser(on=on))
 
 
 def suction(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Suck, or let go."""
     on = call.given.flag("on")
-    return told_of_tools(call, f"suction {'on' if on else 'off'}", lambda view: view.suction(on=on))
+    return switch_tool(call, f"suction {'on' if on else 'off'}", lambda view: view.suction(on=on))
 
 
 def gripper(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Close or open the gripper."""
     closed = call.given.flag("closed")
-    return told_of_tools(call, f"{'close' if closed else 'open'} the gripper", lambda view: view.gripper(closed=closed))
+    return switch_tool(call, f"{'close' if closed else 'open'} the gripper", lambda view: view.gripper(closed=closed))
 
 
 def gripper_to(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Open it partly."""
     percent = call.given.number("percent", 0, 100)
-    return told_of_tools(call, f"open the gripper to {percent:g} %", lambda view: view.gripper_to(percent))
+    return switch_tool(call, f"open the gripper to {percent:g} %", lambda view: view.gripper_to(percent))
 
 
 def conveyor(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Run a belt."""
     speed, motor = call.given.whole("speed", -100_000, 100_000), call.given.whole("motor", 0, 1, 0)
-    return told_of_tools(call, f"belt at {speed} pulses/s", lambda view: view.conveyor(speed, motor))
+    return switch_tool(call, f"belt at {speed} pulses/s", lambda view: view.conveyor(speed, motor))
 
 
 def configure_pin(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Say what a pin is for."""
     pin, use = call.given.whole("pin", 1, 64), call.given.word("use", ("input", "output"))
-    return told_of_tools(call, f"pin {pin} is an {use}", lambda view: view.configure_pin(pin, use))
+    return switch_tool(call, f"pin {pin} is an {use}", lambda view: view.configure_pin(pin, use))
 
 
 def output(call: PageRequest) -> Coroutine[Any, Any, Any]:
     """Set an output."""
     pin, level = call.given.whole("pin", 1, 64), call.given.flag("level")
-    return told_of_tools(call, f"output {pin} {'high' if level else 'low'}", lambda view: view.output(pin, level=level))
+    return switch_tool(call, f"output {pin} {'high' if level else 'low'}", lambda view: view.output(pin, level=level))
 
 
 def watch_inputs(call: PageRequest) -> Coroutine[Any, Any, Any]:
@@ -98,7 +98,7 @@ def watch_inputs(call: PageRequest) -> Coroutine[Any, Any, Any]:
 
         call.station.watched_inputs = pins
 
-    return told_of_tools(call, "look at inputs", looked)
+    return switch_tool(call, "look at inputs", looked)
 
 
 def rail(call: PageRequest) -> Coroutine[Any, Any, Any]:

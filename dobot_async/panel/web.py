@@ -1,8 +1,8 @@
 """The HTTP side: who may come in, the page's files, the WebSocket, uploads and downloads.
 
-    connection --Doorkeeper--> request --Access--> Role --> file, socket, upload, download
+    connection --PendingConnections--> request --Access--> Role --> file, socket, upload, download
 
-What is refused is a short text, or JSON where the page asked; nothing that strangers have said is in it.
+What is refused is a short text, or JSON where the page asked; nothing that was received is in it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ LARGEST_RECORDING = 2**20
 UPLOAD_WITHIN = 30.0  # seconds
 UPLOADS, UPLOAD_BURST = 10 / 60, 10.0  # a second, and at once
 PINGS = 10 / 3  # seconds; one that is not answered half of that later ends the connection
-TOLD, TOLD_BURST = 0.5, 40.0  # lines of the log that strangers can cause, a second and at once
+TOLD, TOLD_BURST = 0.5, 40.0  # lines of the log that any peer can cause, a second and at once
 STATUS = {"rate": 429, "busy": 429, "role": 403, "lease": 403, "link": 503}
 WELCOME = (
     '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0;url=/">'
@@ -264,7 +264,7 @@ class Web:
         return bytes(data)
 
     def _turned_away(self, who: str, why: str) -> None:
-        """Take note that somebody was not let in; of what strangers can cause at will only so much."""
+        """Take note that somebody was not let in; of what any peer can cause, a limited number."""
         if self._lines.wait:
             self._left_out += 1
             return

@@ -1,4 +1,4 @@
-"""What others may have done: actions, as rows with typed fields; and how one is read from JSON.
+"""The actions that remote callers may request, as dataclasses with typed fields; and their JSON form.
 
     {"do": "move", "x": 220, "y": 0, "z": 40} --> Move(x=220.0, y=0.0, z=40.0) --check--> --run--> what is said of it
 

@@ -1,4 +1,4 @@
-"""What has to be known of each family to let others move it: how a speed in percent is said, and which hand it has.
+"""What remote actions have to know of each family: how a speed in percent is set, and which tools it has.
 
 Magician   the ratio of all PTP motions, set before each action
 myCobot    `speed=` of each motion, percent

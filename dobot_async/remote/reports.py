@@ -1,4 +1,4 @@
-"""What others are told of an arm: where it is, what is wrong with it, where it may go; as JSON can hold it."""
+"""Reports of an arm as JSON values: its pose, its alarms, its limits and its reach."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done with each arm for others: one thing at a time, which ends with whoever asked for it.
+"""The running actions of a site: one at a time for each arm; an action ends when its caller goes.
 
 do --> busy? refused --> task --> done, or what went wrong
 |                 `-- cancelled, or its caller is gone: the arm is stopped before this returns

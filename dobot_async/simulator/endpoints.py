@@ -39,7 +39,7 @@ BLE_OPTIONS = {"name": str, "address": str, "interval": float, "mtu": int, "pack
 PTY_OPTIONS = {"baud": int}
 
 
-class Lapse:
+class ScaledClock:
     """The seconds of the event loop since this was made, times `speed`."""
 
     def __init__(self, speed: float) -> None:
@@ -145,7 +145,7 @@ async def simulate(
         raise ValueError(f"speed must be above 0 and finite, not {speed!r}")
 
     serve = endpoint(listen)
-    clock = clock or Lapse(speed)
+    clock = clock or ScaledClock(speed)
     if scene is not None:
         clock = scene.share_clock(clock, speed)
     elif mount is not None:

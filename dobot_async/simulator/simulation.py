@@ -73,10 +73,10 @@ class Simulation(Generic[A]):
     def client(
         self,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
+        disconnect: Callable[[], None],
         *,
         ordered: bool,
-        hold: Callable[[bool], None] = lambda _: None,
+        pause_reading: Callable[[bool], None] = lambda _: None,
         name: str = "",  # noqa: ARG002 - an arm tells of nobody
     ) -> SimulatedClient:
         """Called by an endpoint: somebody has connected, and takes replies by `deliver`."""
@@ -86,9 +86,9 @@ class Simulation(Generic[A]):
             self.faults,
             self._random,
             deliver,
-            hang_up,
+            disconnect,
             ordered=ordered,
-            hold=hold,
+            pause_reading=pause_reading,
             outages=self.outages,
         )
         self._clients[client] = None
@@ -113,7 +113,7 @@ class Simulation(Generic[A]):
             client.close()
 
         for client in clients:
-            client.hang_up()
+            client.disconnect()
 
     def vanish(self) -> None:
         """The arm neither reads nor answers any more what its clients of now send; their connections stay open.
@@ -138,19 +138,19 @@ class SimulatedClient:
         faults: Faults,
         random: Random,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
+        disconnect: Callable[[], None],
         *,
         ordered: bool,
-        hold: Callable[[bool], None],
+        pause_reading: Callable[[bool], None],
         outages: list[tuple[float, float]],
     ) -> None:
-        self.hang_up = hang_up
-        self._hold = hold
+        self.disconnect = disconnect
+        self._pause_reading = pause_reading
         self._new_session = session
         self._session = session()
         self._loop = asyncio.get_running_loop()
         self._sent = self._loop.time()
-        self._gone = self._deaf = False
+        self._gone = self._ignoring = False
         state = LineState(outages)
         self._back = FaultyChannel(faults, random, deliver, ordered=ordered, state=state, from_arm=True)
         self._there = FaultyChannel(faults, random, self._answer, ordered=ordered, state=state)
@@ -162,7 +162,7 @@ class SimulatedClient:
 
     def send(self, data: bytes) -> None:
         """Puts a request on the line."""
-        if self._deaf:
+        if self._ignoring:
             return
 
         now = self._loop.time()
@@ -185,9 +185,9 @@ class SimulatedClient:
 
     def vanish(self) -> None:
         """The arm hears and says nothing any more; what is sent waits in the system's buffers, or is lost."""
-        self._deaf = True
+        self._ignoring = True
         self.close()
-        self._hold(True)
+        self._pause_reading(True)
 
     def _answer(self, data: bytes) -> None:
         replies = self._session.receive(data)

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any
 
 HOMES = {
-    "fleet": ("Fleet", "Member", "Together"),
+    "fleet": ("Fleet", "Member"),
     "follow": ("Follow",),
     "link": ("Link",),
     "magician": ("Magician",),
@@ -20,6 +20,7 @@ HOMES = {
     "mycobot": ("MyCobot",),
     "portal": ("run",),
     "simulation": ("Simulation", "simulate"),
+    "together": ("Together",),
     "ultraarm": ("UltraArm",),
 }
 """The module of each name, which is imported when the name is first asked for."""

@@ -136,7 +136,7 @@ class Caller:
         self._beside: set[asyncio.Task[None]] = set()
         self._news = asyncio.Event()
         self._busy = self._over = False
-        self._owed: asyncio.CancelledError | None = None
+        self._pending_cancel: asyncio.CancelledError | None = None
 
     def begin(self, context: contextvars.Context) -> None:
         """Serve, in a task of its own, until `end` or the end of the loop."""
@@ -179,15 +179,15 @@ class Caller:
                 try:
                     await self._news.wait()
                 except asyncio.CancelledError as error:
-                    self._owed = error
+                    self._pending_cancel = error
                     self.loop.call_later(GRACE, self._give_up, error)
 
                 continue
 
             call = self._waiting.popleft()
-            owed, self._owed = self._owed, None
-            if owed:
-                call.refuse(owed)
+            pending, self._pending_cancel = self._pending_cancel, None
+            if pending:
+                call.refuse(pending)
                 continue
 
             self._busy = True
@@ -198,8 +198,8 @@ class Caller:
             finally:
                 self._busy = False
 
-        if self._owed:
-            raise self._owed
+        if self._pending_cancel:
+            raise self._pending_cancel
 
     async def _serve_alone(self) -> None:
         """Serve; a cancellation is the loop's end."""
@@ -217,7 +217,7 @@ class Caller:
 
     def _give_up(self, error: asyncio.CancelledError) -> None:
         """A thread that was to be told of a cancellation has called nothing."""
-        if self._owed is error:
+        if self._pending_cancel is error:
             self.end()
 
 

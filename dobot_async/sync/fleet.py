@@ -17,19 +17,19 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, cast, overload
 from dobot_async import DobotError
 from dobot_async import Fleet as AsyncFleet
 from dobot_async._core.util.shapes import Shape
-from dobot_async.fleet import BaseFrame, Place, Start
+from dobot_async.fleet import BaseFrame, Place
 from dobot_async.fleet import Member as AsyncMember
-from dobot_async.fleet import Together as AsyncTogether
 from dobot_async.fleet.fleet_base import OnFailure
 from dobot_async.sync.calls import in_thread
 from dobot_async.sync.magician import Batch, Magician
 from dobot_async.sync.mycobot import CobotBatch, MyCobot
 from dobot_async.sync.portal import PORTAL
+from dobot_async.sync.together import Together
 from dobot_async.sync.twin import BlockingContext, Twin
 from dobot_async.sync.twins import asynchronous_of, blocking_of, twin_of
 from dobot_async.sync.ultraarm import UltraArm, UltraArmBatch
 
-__all__ = ["Fleet", "Member", "Together"]
+__all__ = ["Fleet", "Member"]
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -51,39 +51,6 @@ class Member(AsyncMember[A]):
         given: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         given["kind"] = asynchronous_of(self.kind)
         return AsyncMember(**given)
-
-
-class Together(Twin[AsyncTogether[Any]], Generic[B]):
-    """The batches of several arms, by name; each verb returns its Motion, to be waited for after the block."""
-
-    __slots__ = ()
-
-    @property
-    def start(self) -> Start | None:
-        """How they started, once the block has ended."""
-        return self.asynchronous.start
-
-    @property
-    def skew(self) -> float:
-        """Seconds between the first and the last start.
-
-        Raises:
-            RuntimeError: The block has not ended yet.
-        """
-        return self.asynchronous.skew
-
-    def __getitem__(self, name: str) -> B:
-        return cast(B, twin_of(self.asynchronous[name]))
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.asynchronous)
-
-    def __len__(self) -> int:
-        return len(self.asynchronous)
-
-    def wait(self) -> None:
-        """Returns when all motions are done; raises the first failure when all have ended."""
-        PORTAL.run(self.asynchronous.wait)
 
 
 class Fleet(Twin[AsyncFleet[Any]], Generic[A]):

@@ -1,7 +1,7 @@
-"""What a recorded connection had asked, and what came from the arm to each of it.
+"""The requests of a recorded connection with their replies.
 
-Replies are given to requests by the link's own rules (`Correlator`); what answers nothing belongs to the request before
-it. A request whose reply was lost has none here either.
+Replies are matched to requests by the link's own rules (`Correlator`); an unsolicited frame belongs to the request
+before it. A request whose reply was lost has none.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ class TraceFigures:
         commands: By name, in the order in which they were first sent.
         motions: All of them, in the order in which they were put.
         deepest: The most that waited in the queue at a time.
-        silence: The longest time in seconds for which the arm owed an answer, and none came.
+        silence: The longest time in seconds for which a request was unanswered.
         outages: How often the connection broke.
         junk: Bytes that were no frame.
         error: How the connection's block ended, "" if well.
@@ -157,7 +157,7 @@ def depth(trace: Trace) -> list[tuple[float, int]]:
 
 
 def longest_silence(recorded: Exchanges) -> float:
-    """Return the longest time for which an answer was owed and nothing came."""
+    """Return the longest time for which a request was unanswered."""
     longest, came = 0.0, iter([*recorded.came, recorded.end])
     until = next(came)
     heard = recorded.opening.t

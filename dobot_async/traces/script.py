@@ -1,4 +1,4 @@
-"""What a recorded connection had asked, and what the arm had said to it: the part of a replay that does no I/O.
+"""The recorded requests and replies of a connection, in the order of a replay; no I/O.
 
     recorded      GetPose  SetPTPCmd  GetIndex  GetIndex  SetPTPCmd
     asked again   GetPose  SetPTPCmd  GetIndex                       --> what was said to that one, with its delay
@@ -6,8 +6,9 @@
 1. A command is the next one of the same bytes that was recorded. It sets the clock of the replay to when that was.
 2. A question is the next one of the same bytes that was asked behind all that was heard by now, if that was not much
    later than it is now, or behind a motion that is still to come. Asked later than then it sets the clock back.
-3. What is asked more often than it was is answered as the last time; not while the arm was silent.
-4. What was never asked, or was done once and is asked for again, is not answered; the second time the replay ends.
+3. A question that is asked more often than it was recorded gets its last reply again; not while the arm was silent.
+4. A request that was never recorded, or a command repeated that was recorded once, is not answered; the second time
+   the replay ends.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from dobot_async.traces.reader import Trace
 __all__ = ["Script", "Unrecorded"]
 
 SLACK = 0.25
-"""Seconds by which a question may come earlier than it did, and for which an arm may owe an answer."""
+"""Seconds by which a question may come earlier than it did, and for which an answer may be outstanding."""
 
 
 class Unrecorded(Exception):

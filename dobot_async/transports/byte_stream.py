@@ -16,15 +16,15 @@ from typing import Any
 import anyio
 
 from dobot_async._core.protocol.transport import MANY
+from dobot_async.transports.input_buffer import BUFFER, InputBuffer
 
-__all__ = ["BUFFER", "DRAIN", "WINDOW", "ByteStreamTransport"]
+__all__ = ["DRAIN", "WINDOW", "ByteStreamTransport"]
 
 WINDOW = 16
-BUFFER = 1 << 16
 DRAIN = 0.5
 
 
-class ByteStreamTransport(asyncio.Protocol):
+class ByteStreamTransport(InputBuffer, asyncio.Protocol):
     """An open connection or port; made by asyncio, which calls what is no verb of a transport."""
 
     in_flight = MANY
@@ -32,14 +32,8 @@ class ByteStreamTransport(asyncio.Protocol):
     reorder_window = 0.0
 
     def __init__(self) -> None:
-        loop = asyncio.get_running_loop()
-        self._loop = loop
-        self._lost: asyncio.Future[None] = loop.create_future()
-        self._cause: BaseException | None = None
-        self._closing = False
+        super().__init__()
         self._transport: Any = None
-        self._buffer = bytearray()
-        self._arrived: asyncio.Future[None] | None = None
         self._take: Callable[[bytes], None] | None = None
         self._writable = asyncio.Event()
         self._writable.set()
@@ -52,7 +46,7 @@ class ByteStreamTransport(asyncio.Protocol):
 
     def write(self, data: bytes) -> bool:
         """Write one frame now; return False if the output is full or the connection is gone."""
-        if self._closing or self._lost.done() or not self._writable.is_set():
+        if self._closed or self._lost.done() or not self._writable.is_set():
             return False
 
         self._put(data)
@@ -60,13 +54,7 @@ class ByteStreamTransport(asyncio.Protocol):
 
     async def receive(self) -> bytes:
         """Return what has arrived, at least one byte."""
-        while not self._buffer:
-            self._check_input()
-            self._arrived = self._loop.create_future()
-            await self._arrived
-
-        data = bytes(self._buffer)
-        self._buffer.clear()
+        data = await super().receive()
         if not self._lost.done():
             self._transport.resume_reading()
 
@@ -80,16 +68,14 @@ class ByteStreamTransport(asyncio.Protocol):
         self._take = take
         try:
             while True:
-                self._check_input()
-                self._arrived = self._loop.create_future()
-                await self._arrived
+                await self._arrival()
         finally:
             self._take = None
 
     async def aclose(self) -> None:
         """Close it; what cannot be written within half a second is thrown away."""
-        if not self._closing:
-            self._closing = True
+        if not self._closed:
+            self._closed = True
             self._wake()
             try:
                 await self._drain()
@@ -146,19 +132,8 @@ class ByteStreamTransport(asyncio.Protocol):
             await self._writable.wait()
             self._check()
 
-    def _wake(self) -> None:
-        if self._arrived and not self._arrived.done():
-            self._arrived.set_result(None)
-
-    def _check(self) -> None:
-        if self._closing:
-            raise anyio.ClosedResourceError
-
-        if self._lost.done():
-            raise anyio.BrokenResourceError from self._cause
-
     def _check_input(self) -> None:
-        if self._lost.done() and not self._closing and not self._cause:
+        if self._lost.done() and not self._closed and not self._cause:
             raise anyio.EndOfStream
 
         self._check()

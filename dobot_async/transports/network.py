@@ -91,8 +91,8 @@ async def open_url(url: SplitResult, *, arm: str) -> Transport:  # noqa: ARG001 
         return await (reach_udp if url.scheme == "udp" else reach_tcp)(host, port, token=token, **given)
     except OSError as error:
         raise ConnectFailed(
-            f"cannot reach {url.scheme}://{url.netloc}: {str(error) or 'it hung up'}; is the address right, "
-            "and is the arm (or its serial server) in this network?"
+            f"cannot reach {url.scheme}://{url.netloc}: {str(error) or 'the connection was closed'}; is the address "
+            "right, and is the arm (or its serial server) in this network?"
         ) from error
 
 

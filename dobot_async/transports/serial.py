@@ -11,16 +11,14 @@ import asyncio
 import os
 import threading
 from collections.abc import Callable
-from contextlib import suppress
 
 import serial
 from serial_asyncio import connection_for_serial
 
-from dobot_async.transports.byte_stream import DRAIN, ByteStreamTransport
+from dobot_async.transports.port import PortTransport
 
 __all__ = ["SerialTransport", "open_port"]
 
-POLL = 0.005
 POSIX = os.name == "posix"
 
 
@@ -59,7 +57,7 @@ class Port(serial.Serial):
         return data
 
 
-class SerialTransport(ByteStreamTransport):
+class SerialTransport(PortTransport):
     """An open serial port."""
 
     def __init__(self) -> None:
@@ -95,30 +93,13 @@ class SerialTransport(ByteStreamTransport):
             self._abort()
             return b""
 
-    async def _drain(self) -> None:
-        """Wait for the output for a moment, then throw away what the port did not take."""
-        if self._lost.done():
-            return
+    def _unwritten(self) -> int:
+        """Bytes that the system still holds."""
+        return int(self._transport.serial.out_waiting)
 
-        transport = self._transport
-        transport.set_write_buffer_limits(high=0)
-        try:
-            async with asyncio.timeout(DRAIN):
-                while transport.get_write_buffer_size() and not self._lost.done():
-                    self._writable.clear()
-                    await self._writable.wait()
-
-                while not self._lost.done() and transport.serial.out_waiting:  # noqa: ASYNC110 - nobody tells when
-                    await asyncio.sleep(POLL)
-        except (TimeoutError, asyncio.CancelledError) as error:
-            # Whatever becomes of this, the port is closed next.
-            with suppress(Exception):
-                transport.serial.reset_output_buffer()
-
-            if isinstance(error, asyncio.CancelledError):
-                raise
-        except OSError:
-            return
+    def _discard_output(self) -> None:
+        """Throw away what the system still holds."""
+        self._transport.serial.reset_output_buffer()
 
     def _abort(self) -> None:
         """End the port, exactly once: one that ends by itself is left alone, unless output keeps it from it."""

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from contextlib import suppress
 
 from serialx import BaseSerialTransport, PinState, SerialException, create_serial_connection
 
 from dobot_async._core.util.tasks import run_shielded
-from dobot_async.transports.byte_stream import DRAIN, ByteStreamTransport
+from dobot_async.transports.port import PortTransport
 
 __all__ = ["SerialxTransport", "open_port"]
 
-POLL = 0.005
 PATIENCE = 1.0
 """Seconds that a cancelled opening waits until the system has let go of the port."""
 logger = logging.getLogger("serialx")
@@ -71,14 +69,15 @@ def discarded(opening: asyncio.Task[SerialxTransport]) -> None:
         opening.result().discard()
 
 
-class SerialxTransport(ByteStreamTransport):
+class SerialxTransport(PortTransport):
     """An open serial port."""
 
     _transport: BaseSerialTransport
+    errors = (OSError, SerialException)
 
     def discard(self) -> None:
         """Close it at once."""
-        self._closing = True
+        self._closed = True
         self._abort()
 
     def _put(self, data: bytes) -> None:
@@ -89,29 +88,13 @@ class SerialxTransport(ByteStreamTransport):
             self._cause = error
             self._abort()
 
-    async def _drain(self) -> None:
-        """Wait for the output for a moment, then throw away what the port did not take."""
-        if self._lost.done():
-            return
+    def _unwritten(self) -> int:
+        """Bytes that the system still holds."""
+        return self._transport.serial.num_unwritten_bytes()
 
-        transport = self._transport
-        transport.set_write_buffer_limits(high=0)
-        try:
-            async with asyncio.timeout(DRAIN):
-                while transport.get_write_buffer_size() and not self._lost.done():
-                    self._writable.clear()
-                    await self._writable.wait()
-
-                while not self._lost.done() and transport.serial.num_unwritten_bytes():  # noqa: ASYNC110 - nobody tells
-                    await asyncio.sleep(POLL)
-        except (TimeoutError, asyncio.CancelledError) as error:
-            with suppress(Exception):  # whatever becomes of this, the port is closed next
-                transport.serial.reset_write_buffer()
-
-            if isinstance(error, asyncio.CancelledError):
-                raise
-        except (OSError, SerialException):
-            return
+    def _discard_output(self) -> None:
+        """Throw away what the system still holds."""
+        self._transport.serial.reset_write_buffer()
 
     def _abort(self) -> None:
         """End the port, unless it has ended."""

@@ -293,7 +293,7 @@ def test_a_row_is_what_the_table_says(model: Any) -> None:
         )
         assert family.name(each) == own.name
         assert family.repeatable(each) is not row.write
-        assert family.may_be_silent(each) is row.write
+        assert family.ack_optional(each) is row.write
 
 
 def test_an_answer_fits_its_request() -> None:

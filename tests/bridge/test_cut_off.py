@@ -1,4 +1,4 @@
-"""Clients that are cut off while what they sent still waits in the bridge, strangers in a crowd, and locked keys."""
+"""Clients that are cut off while what they sent still waits in the bridge, unauthenticated peers, and locked keys."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ async def test_what_still_waits_of_a_client_that_is_cut_off_is_forgotten(listen:
             await mover.transport.send(GET_POSE * 800)
             await other.ask(c.SET_QUEUED_CMD_FORCE_STOP_EXEC)
             await until(lambda: rig.told("cut"))
-            if listen != "pty":  # it cannot be hung up
+            if listen != "pty":  # it cannot be closed
                 await until(lambda: rig.told("left"))
 
         await until(lambda: len(rig.told("left")) == 2)

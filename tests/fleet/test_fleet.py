@@ -294,12 +294,12 @@ async def test_a_lost_link_is_noticed_although_nobody_asks() -> None:
 async def test_a_link_that_is_lost_before_its_arm_has_its_seat_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     begin = FleetArm.begin
 
-    async def begin_too_late(seat: FleetArm, arm: Arm, options: Mapping[str, Any]) -> None:
-        if seat.name == "left":
+    async def begin_too_late(fleet_arm: FleetArm, arm: Arm, options: Mapping[str, Any]) -> None:
+        if fleet_arm.name == "left":
             sims["left"].unplug()
             await anext(aiter(arm.link.state))
 
-        await begin(seat, arm, options)
+        await begin(fleet_arm, arm, options)
 
     monkeypatch.setattr(FleetArm, "begin", begin_too_late)
     async with cell("left", "right") as sims, Fleet.connect(urls(sims)) as fleet:

@@ -87,7 +87,7 @@ class Observed:
     def _watch_the_line(self) -> None:
         connect = self.sim.client
 
-        def client(deliver: Callable[[bytes], None], hang_up: Callable[[], None], **details: Any) -> Any:
+        def client(deliver: Callable[[bytes], None], disconnect: Callable[[], None], **details: Any) -> Any:
             heard, said = Parser(), Parser()
 
             def delivered(data: bytes) -> None:
@@ -96,7 +96,7 @@ class Observed:
 
                 deliver(data)
 
-            line = connect(delivered, hang_up, **details)
+            line = connect(delivered, disconnect, **details)
             send = line.send
 
             def sent(data: bytes) -> None:

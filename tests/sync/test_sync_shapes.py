@@ -17,13 +17,13 @@ from dobot_async import sync
 from dobot_async.arms.ultraarm.gcode import GCodeRun
 from dobot_async.fleet import Fleet, Together
 from dobot_async.simulator import Simulation, simulate
-from dobot_async.sync import fleet, link, magician, mycobot, simulation, streams, twins, ultraarm
+from dobot_async.sync import fleet, link, magician, mycobot, simulation, streams, together, twins, ultraarm
 
 PAIRS: dict[type[Any], type[Any]] = {
     **{twin.kind: getattr(sync_page, twin.called) for sync_page, twin in write_sync.pages()},
     dobot_async.Link: link.Link,
     Fleet: fleet.Fleet,
-    Together: fleet.Together,
+    Together: together.Together,
     Simulation: simulation.Simulation,
     GCodeRun: streams.GCodeRun,
 }

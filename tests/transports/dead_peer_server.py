@@ -26,7 +26,7 @@ from dobot_async.endpoints.listeners import on_tcp
 class Echo:
     """A host of `listeners`: a client is what sends to it."""
 
-    def client(self, deliver: Callable[[bytes], None], hang_up: Callable[[], None], **_: Any) -> Any:
+    def client(self, deliver: Callable[[bytes], None], disconnect: Callable[[], None], **_: Any) -> Any:
         """Somebody has come."""
         return type("Client", (), {"send": staticmethod(deliver)})()
 

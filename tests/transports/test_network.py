@@ -78,7 +78,7 @@ class TcpPeer:
         writer.write(data)
         await writer.drain()
 
-    async def hang_up(self, *, reset: bool = False) -> None:
+    async def disconnect(self, *, reset: bool = False) -> None:
         """Ends the connection."""
         _, writer = await self.connected
         if reset:
@@ -219,7 +219,7 @@ async def test_a_tcp_peer_that_hangs_up_ends_the_link(reset: bool) -> None:
     async with tcp_peer() as peer, linked(peer.url) as link:
         call = asyncio.create_task(link.request(c.GET_POSE, None, timeout=60))
         await peer.read(6)
-        await peer.hang_up(reset=reset)
+        await peer.disconnect(reset=reset)
         with pytest.raises(ConnectionLost) as lost:
             await call
 

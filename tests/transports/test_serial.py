@@ -22,6 +22,7 @@ from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.frame import Frame, Parser, request
 from dobot_async.errors import ConnectFailed, ConnectionLost
 from dobot_async.transports import open_transport, serial_port
+from dobot_async.transports import port as serial_output
 from dobot_async.transports import serial as serial_transport
 from dobot_async.transports import serialx as serialx_transport
 
@@ -428,7 +429,7 @@ async def test_closing_with_unread_data_does_not_hang(terminal: Terminal) -> Non
 async def test_closing_with_unsent_data_does_not_hang(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
-    monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 0.02)
+    monkeypatch.setattr(serial_output, "DRAIN", 0.02)
     async with opened(terminal) as transport:
         sending = asyncio.create_task(transport.send(bytes(size)))
         await step(10)
@@ -444,7 +445,7 @@ async def test_closing_a_broken_port_with_unsent_data_does_not_hang(
     def fail(port: serial.Serial, size: int) -> bytes:
         raise serial.SerialException("broken")
 
-    monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 0.02)
+    monkeypatch.setattr(serial_output, "DRAIN", 0.02)
     async with opened(terminal) as transport:
         await transport.send(bytes(BUFFER // 2))
         monkeypatch.setattr(serial_transport.Port, "read", fail)
@@ -485,7 +486,7 @@ async def test_closing_waits_for_the_systems_own_buffer(terminal: Terminal, monk
     assert next(waiting, None) is None
     assert not thrown_away
 
-    monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 0.02)
+    monkeypatch.setattr(serial_output, "DRAIN", 0.02)
     monkeypatch.setattr(serial.Serial, "out_waiting", 1)
     async with opened(terminal):
         pass
@@ -523,7 +524,7 @@ async def test_closing_after_unplugging(terminal: Terminal) -> None:
 async def test_closing_may_be_cancelled_anywhere(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch, unsent: bool
 ) -> None:
-    monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 60)
+    monkeypatch.setattr(serial_output, "DRAIN", 60)
     for steps in range(6):
         transport = await open_transport(terminal.url, arm="magician")
         if unsent:
@@ -536,9 +537,9 @@ async def test_closing_may_be_cancelled_anywhere(
         if steps:
             await transport.aclose()
         else:
-            monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 0.02)
+            monkeypatch.setattr(serial_output, "DRAIN", 0.02)
             await transport.aclose()
-            monkeypatch.setattr(MODULES[terminal.backend], "DRAIN", 60)
+            monkeypatch.setattr(serial_output, "DRAIN", 60)
 
 
 async def test_closing_in_a_cancelled_scope_closes_the_port(terminal: Terminal) -> None:

@@ -1,4 +1,4 @@
-"""Tasks that nobody leaves behind: shielded, bounded, cancelled and joined; and work that outlives who asked for it.
+"""Tasks that are always joined: shielded, bounded, cancelled; and cleanup that outlives its caller.
 
     run_shielded   to its end, whatever becomes of the caller
     run_within     for so long at most; ended if the caller is cancelled

@@ -1,4 +1,4 @@
-"""Text of strangers, made fit for a log, a terminal and a file."""
+"""Text from other programs, made printable for a log, a terminal and a file."""
 
 from __future__ import annotations
 

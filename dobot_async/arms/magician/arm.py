@@ -38,7 +38,7 @@ from dobot_async.arms.magician.sensors import Sensors
 from dobot_async.arms.magician.trace_words import FRAMES
 from dobot_async.arms.magician.verbs import Verbs
 from dobot_async.arms.magician.wifi import WiFi
-from dobot_async.arms.session import arm_session, check_options, open_in_time, run_owned
+from dobot_async.arms.session import arm_session, bounds_of, check_options, open_in_time, run_owned
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.traces.recorder import Record, RecordSettings
 
@@ -136,7 +136,7 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
         if not window >= 1:
             raise ValueError(f"window must be at least 1, not {window!r}")
 
-        floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
+        floor, ceiling = bounds_of(reply_timeout)
         reopen = partial(open_in_time, arm="magician", timeout=timeout)
 
         def build(transport: Transport, found: str) -> Magician:

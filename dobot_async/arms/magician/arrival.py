@@ -1,4 +1,4 @@
-"""How long the arm needs yet for a motion, judged by where it is: so that it need not be asked for its end before.
+"""The earliest time at which a motion can end, estimated from poses, so that its end is not polled before.
 
 On the first half of its way it needs at least as long as it has needed so far, for it slows down as it has sped up; on
 the second half, as long as at its present speed, for it only becomes slower. A jump goes two ways, one behind the

@@ -173,7 +173,7 @@ class BridgedMagician(ByKey[Frame]):
         "motion": TelemetryRead(MagicianWatch().question, 0.2, told_index),
         "alarms": TelemetryRead(f.request(c.GET_ALARMS_STATE, b"", queued=False), 1.0, told_alarms),
     }
-    denials = {  # noqa: RUF012 - a table
+    deny_groups = {  # noqa: RUF012 - a table
         "wifi": frozenset(range(150, 158)),
         "calibration": frozenset(
             {c.RESET_POSE.id, c.SET_AUTO_LEVELING_CMD.id, *range(140, 144), 222, 223, 224, 230, 231}
@@ -224,7 +224,7 @@ class BridgedMagician(ByKey[Frame]):
 
         return row.repeatable
 
-    def may_be_silent(self, request: Frame) -> bool:  # noqa: ARG002 - it answers everything
+    def ack_optional(self, request: Frame) -> bool:  # noqa: ARG002 - it answers everything
         """Returns False."""
         return False
 

@@ -81,11 +81,13 @@ class MagicianExecutor(Submission):
         if self._downloading:
             commands.append((c.SET_QUEUED_CMD_STOP_DOWNLOAD, None))
 
-        await run_concurrently(*(self._insist(command, value) for command, value in (*commands, *tools)))
+        await run_concurrently(
+            *(self._send_until_acknowledged(command, value) for command, value in (*commands, *tools))
+        )
         self._downloading = False
         if tools:
             # Again: a queued command may have switched one on before the arm heard that it is to stop.
-            await run_concurrently(*(self._insist(command, value) for command, value in tools))
+            await run_concurrently(*(self._send_until_acknowledged(command, value) for command, value in tools))
             self._tools_ended = max(self._tools_ended, wanted)
 
     async def clear(self) -> None:
@@ -120,11 +122,11 @@ class MagicianExecutor(Submission):
     async def end_download(self) -> None:
         """Let the arm execute again what it is told; repeated until it has heard it. Manual 2.19.5."""
         if self._downloading:
-            await self._insist(c.SET_QUEUED_CMD_STOP_DOWNLOAD, None)
+            await self._send_until_acknowledged(c.SET_QUEUED_CMD_STOP_DOWNLOAD, None)
             self._downloading = False
             self.space.room = 0
 
-    async def _insist(self, command: Command[Q, None], value: Q) -> None:
+    async def _send_until_acknowledged(self, command: Command[Q, None], value: Q) -> None:
         """Say what stops something until the arm has heard it."""
         await self._link.request(command, value, timeout=math.inf, urgent=True)
 

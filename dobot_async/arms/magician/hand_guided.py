@@ -1,4 +1,4 @@
-"""A Magician led by somebody: jogged from here, or guided by hand."""
+"""A Magician that an operator moves: jogged, or guided by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What keeps a Magician in its workspace: the ways of its motions, as far as they are known; see `paths`.
+"""Workspace check of a Magician: the paths of its motions, as far as they are known; see `paths`.
 
 Not known is where the arm is behind `home`, and behind what it cannot reach: of motions that begin there the target
 alone is looked at, and increments are refused. On a rail, all is seen from the arm, as its coordinates are.

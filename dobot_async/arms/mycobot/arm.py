@@ -31,7 +31,7 @@ from dobot_async.arms.mycobot.queue import CobotQueue
 from dobot_async.arms.mycobot.readings import Readings
 from dobot_async.arms.mycobot.trace_words import frames_of
 from dobot_async.arms.mycobot.verbs import Verbs
-from dobot_async.arms.session import arm_session, check_options, run_owned
+from dobot_async.arms.session import arm_session, bounds_of, check_options, run_owned
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
 from dobot_async.traces.recorder import Record, RecordSettings
 
@@ -151,10 +151,8 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         gap = check_duration(gap, "gap")
         budget = check_budget(max_requests)
         kept = workspace_of(workspace)
-        if len(tolerance) != 2 or not min(check_duration(each, "tolerance") for each in tolerance) > 0:
-            raise ValueError(f"tolerance must be degrees and mm, both above 0, not {tolerance!r}")
-
-        floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
+        check_tolerance(tolerance)
+        floor, ceiling = bounds_of(reply_timeout)
         reopen = partial(opened, model=model, timeout=timeout, gap=gap)
 
         def connected(transport: Transport, found: str) -> Link[frame.Frame]:
@@ -190,11 +188,7 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
             yield arm
             unsent = arm.queue.unsent
 
-        if unsent:
-            raise MotionStopped(
-                f"the block ended while {unsent} commands waited in the queue, which is on this side: they were never "
-                "sent; await arm.queue.join() before the end"
-            )
+        check_all_sent(unsent)
 
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
         """Send any row of the command table immediately, and return the arm's answer, None for a command.
@@ -304,3 +298,18 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
     async def leave(self) -> None:
         """Stop the arm, until it says that it stands; for `connect`."""
         await self.queue.begin_stop(MotionStopped("the connection's block was left by an error"))
+
+
+def check_tolerance(tolerance: Tolerance) -> None:
+    """Raise ValueError for what is no tolerance."""
+    if len(tolerance) != 2 or not min(check_duration(each, "tolerance") for each in tolerance) > 0:
+        raise ValueError(f"tolerance must be degrees and mm, both above 0, not {tolerance!r}")
+
+
+def check_all_sent(unsent: int) -> None:
+    """Raise MotionStopped if a block has ended while commands waited to be sent."""
+    if unsent:
+        raise MotionStopped(
+            f"the block ended while {unsent} commands waited in the queue, which is on this side: they were never "
+            "sent; await arm.queue.join() before the end"
+        )

@@ -96,7 +96,7 @@ class BridgedCobot(ByKey[Frame]):
         self.barriers = tuple(request(model, row) for row in BARRIERS if row in model.rows)
         self.greeting = request(model, c.IS_POWER_ON)
         self.stopping = (request(model, c.STOP),)
-        self.denials = {"calibration": frozenset(model.rows[row].id for row in CALIBRATION if row in model.rows)}
+        self.deny_groups = {"calibration": frozenset(model.rows[row].id for row in CALIBRATION if row in model.rows)}
         self.readings = {
             "pose": TelemetryRead(request(model, c.GET_COORDS), 0.2, self._told_coords),
             "joints": TelemetryRead(request(model, c.GET_ANGLES), 0.2, self._told_angles),
@@ -146,7 +146,7 @@ class BridgedCobot(ByKey[Frame]):
         """
         return self.kind(request) is RequestKind.READ
 
-    def may_be_silent(self, request: Frame) -> bool:
+    def ack_optional(self, request: Frame) -> bool:
         """Returns whether the arm may have taken a request without an answer: each command."""
         return self.kind(request) is not RequestKind.READ
 

@@ -17,7 +17,7 @@ from dobot_async.errors import MotionUnknown
 __all__ = ["stop_until_still"]
 
 STOP_TIME = 2.0  # seconds within which an arm stands that has heard that it is to stop
-INSIST = 0.4  # seconds after which an arm that does not answer is told again to stop, at the most
+STOP_AGAIN = 0.4  # seconds after which an arm that does not answer is told again to stop, at the most
 UNHEARD = 2 * LOOKS  # looks in a row, all of them still, of an arm that has not acknowledged that it is to stop
 
 
@@ -34,20 +34,20 @@ async def stop_until_still(channel: Channel) -> None:
     link, model, loop = channel.link, channel.model, asyncio.get_running_loop()
     stop, look = (link.frame(model.row(row), None) for row in (c.STOP, c.IS_MOVING))
     flag = model.row(c.IS_MOVING).reply
-    insist = max(INSIST, channel.patience)
+    again = max(STOP_AGAIN, channel.patience)
     heard = silent = False
     still, moving_since = 0, math.inf
     while still < (LOOKS if heard else UNHEARD):
         await link.opened()
         try:
-            told = await link.send(stop, lambda _: None, timeout=insist)
-            last = await link.send(look, lambda each: flag.decode(each.params), timeout=insist)
+            told = await link.send(stop, lambda _: None, timeout=again)
+            last = await link.send(look, lambda each: flag.decode(each.params), timeout=again)
             if silent:  # a barrier each time would keep the first answers from those who ask next
-                await asyncio.sleep(insist)
+                await asyncio.sleep(again)
                 silent = link.heard_at < told.sent_at
                 continue
 
-            answered = await link.settle(last, insist)
+            answered = await link.settle(last, again)
         except TimeoutError:
             silent, still, moving_since = True, 0, math.inf
             continue

@@ -18,7 +18,7 @@ from dobot_async._core.util.arguments import check_choice, check_duration
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.tasks import STAYING
 from dobot_async._core.util.workspace import Workspace, workspace_of
-from dobot_async.arms.session import arm_session, check_options, run_owned
+from dobot_async.arms.session import arm_session, bounds_of, check_options, run_owned
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.following import UltraArmFollowing
 from dobot_async.arms.ultraarm.frame import BARRIERS, Frame, Parser, encode
@@ -152,7 +152,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
 
         budget = check_budget(max_requests)
         kept = workspace_of(workspace)
-        floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
+        floor, ceiling = bounds_of(reply_timeout)
         reopen = partial(opened, timeout=timeout)
 
         def build(transport: Transport, found: str) -> UltraArm:

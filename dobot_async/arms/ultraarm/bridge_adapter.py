@@ -136,8 +136,8 @@ class BridgedUltraArm:
     def __init__(self) -> None:
         self.greeting = question(c.GET_QUEUE_SIZE)
         self.stopping = (question(c.JOG_STOP), question(c.LASER_OFF), question(c.SET_PWM, c.PWM(0)))
-        self.insisting = (question(c.RELEASE), *self.stopping)
-        self.denials = {"calibration": frozenset(row.name for row in CALIBRATION)}
+        self.escalated_stop = (question(c.RELEASE), *self.stopping)
+        self.deny_groups = {"calibration": frozenset(row.name for row in CALIBRATION)}
         self.readings = {
             "pose": TelemetryRead(question(c.GET_COORDS), 0.2, lambda reply: told(c.GET_COORDS, reply)),
             "joints": TelemetryRead(question(c.GET_ANGLES), 0.2, lambda reply: told(c.GET_ANGLES, reply)),
@@ -206,7 +206,7 @@ class BridgedUltraArm:
         """Return whether it may be sent again: what reads, and what stops."""
         return self.kind(request) is not RequestKind.WRITE
 
-    def may_be_silent(self, request: BridgedLine) -> bool:  # noqa: ARG002 - what closes each answer is asked with it
+    def ack_optional(self, request: BridgedLine) -> bool:  # noqa: ARG002 - what closes each answer is asked with it
         """Return False."""
         return False
 
@@ -224,7 +224,7 @@ class BridgedUltraArm:
         text = text.strip()
         return BridgedLine(text + b"\r\n" if text else b"")
 
-    def aside(self, frame: BridgedLine) -> bool:
+    def is_unsolicited(self, frame: BridgedLine) -> bool:
         """Return whether the arm has said something that answers nothing."""
         return frame.aside
 

@@ -34,7 +34,7 @@ __all__ = ["PATTERNS", "PREFIX", "Answers", "BridgedLine", "Requests", "fits", "
 
 LONGEST_LINE = 256
 TOKEN = b"TOKEN "
-"""How the line begins that a client with a token sends first; a door that asks for none leaves it in the stream."""
+"""How the line begins that a client with a token sends first; a listener without a token leaves it in the stream."""
 
 ASKED = 16  # requests that the arm has not answered
 NAMED = re.compile(rb"[A-Z0-9]\s*\[", re.IGNORECASE)

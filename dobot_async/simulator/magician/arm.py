@@ -107,12 +107,12 @@ class SimulatedMagician(MagicianBody):
         super().__init__(clock, options, limits or REACH, homed=homed)
         self.quirks = quirks
         self.counters = Counters()
-        self._lapse: float = getattr(clock, "speed", 1.0)
+        self._clock_speed: float = getattr(clock, "speed", 1.0)
 
     @property
     def time_on(self) -> float:
         """Seconds since power-up by the arm's own clock, which goes right in an arm that is simulated faster too."""
-        return self.device.uptime / self._lapse
+        return self.device.uptime / self._clock_speed
 
     def session(self) -> MagicianSession:
         """Returns the arm's side of a connection to a new client."""

@@ -1,4 +1,4 @@
-"""An arm in a scene: where its tool is, what it takes and lets go, what it runs into, what it draws.
+"""An arm in a scene: the place of its tool, what it grips and releases, its collisions, its drawing.
 
 A family says by a `SceneArm` what a scene has to know of a simulated arm, in the arm's own coordinates.
 """

@@ -1,7 +1,7 @@
-"""What bleak's errors mean for somebody who wants to reach an arm, and what to do about each.
+"""The meaning of bleak's errors for a user, and what to do about each.
 
-Bleak speaks with four operating systems and raises what each of them says; on Linux "not connected" alone has four
-faces. Here each gets a sentence, and a word on whether trying again can help.
+Bleak speaks with four operating systems and raises what each of them says; on Linux there are four
+for "not connected" alone. Here each gets a sentence, and whether another attempt can help.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One program at a time: who connects to an arm over BLE claims it on this computer before.
+"""One program at a time: a lock on this computer for each arm that is connected over BLE.
 
 BlueZ lets every program into a connection that one of them has made: each would get the other's answers, and the first
 to disconnect would cut the other off. A lock is a name that only one socket on a computer can have, and that the

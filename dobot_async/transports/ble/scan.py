@@ -1,7 +1,7 @@
-"""Who is in range over BLE: one scan for all who look, and those that are connected already and so cannot be seen.
+"""The BLE devices in range: one scan shared by all searches, and connected devices, which do not advertise.
 
-BlueZ allows each program one scan at a time, so everybody who looks for an arm on one loop and adapter listens to the
-same one; it runs while somebody listens.
+BlueZ allows each program one scan at a time, so all searches on one loop and adapter share it;
+it runs while there is a listener.
 """
 
 from __future__ import annotations

@@ -30,6 +30,7 @@ from dobot_async._core.util.tasks import Ended, run_shielded, run_within
 from dobot_async.transports.ble.diagnostics import trouble
 from dobot_async.transports.ble.lock import DeviceLock
 from dobot_async.transports.ble.scan import INPUT, OUTPUT, SeenDevice
+from dobot_async.transports.input_buffer import BUFFER, InputBuffer
 
 __all__ = ["PACE", "BleTransport"]
 
@@ -42,10 +43,9 @@ GATT = 5.0
 DISCONNECT = 6.0
 LAST_FRAME = 1.0
 LARGEST = 244
-BUFFER = 1 << 16
 
 
-class BleTransport:
+class BleTransport(InputBuffer):
     """A connection to one arm's BLE module; used once.
 
     Attributes:
@@ -57,25 +57,21 @@ class BleTransport:
     reorder_window = 0.0
 
     def __init__(self, seen: SeenDevice, *, url: str, pace: float, adapter: str | None, lock: DeviceLock) -> None:
+        super().__init__()
         self.url = url
         self._lock = lock
         self._pace = pace
-        self._loop = asyncio.get_running_loop()
         self._client = BleakClient(
             seen.device,
             lambda _: self._lose(None),
             timeout=CONNECT,
             bluez=BlueZClientArgs(adapter=adapter) if adapter else BlueZClientArgs(),
         )
-        self._lost: asyncio.Future[None] = self._loop.create_future()
-        self._cause: Exception | None = None
         self._turn = anyio.Lock()
         self._frame: asyncio.Task[None] | None = None
         self._closing: asyncio.Task[None] | None = None
         self._handed_over = -math.inf
         self._answered = False
-        self._buffer = bytearray()
-        self._arrived: asyncio.Future[None] | None = None
 
     async def connect(self) -> None:
         """Connects, and asks for the notifications; raises what bleak does."""
@@ -96,19 +92,9 @@ class BleTransport:
             await asyncio.shield(self._frame)
             self._check()
 
-    async def receive(self) -> bytes:
-        """Returns what has arrived, at least one byte."""
-        while not self._buffer:
-            self._check()
-            self._arrived = self._loop.create_future()
-            await self._arrived
-
-        data = bytes(self._buffer)
-        self._buffer.clear()
-        return data
-
     async def aclose(self) -> None:
         """Disconnects. If the caller is cancelled it goes on, for it may take seconds, and leaks if it is cut short."""
+        self._closed = True
         if not self._closing:
             self._closing = self._loop.create_task(self._close())
 
@@ -189,17 +175,9 @@ class BleTransport:
             self._lost.set_result(None)
             self._wake()
 
-    def _wake(self) -> None:
-        if self._arrived and not self._arrived.done():
-            self._arrived.set_result(None)
-
-    def _check(self) -> None:
-        if self._closing:
-            raise anyio.ClosedResourceError
-
-        if self._lost.done():
-            text = trouble(self._cause).text if self._cause else "the arm's BLE module has disconnected"
-            raise anyio.BrokenResourceError from ConnectionError(text)
+    def _reason(self) -> ConnectionError:
+        text = "the arm's BLE module has disconnected"
+        return ConnectionError(trouble(self._cause).text if isinstance(self._cause, Exception) else text)
 
 
 async def check_version() -> None:

@@ -2,7 +2,7 @@
 
     number (8 bytes, big-endian) | kind (1 byte): DATA, END | bytes, or why it ends
 
-    event loop --bytes--> Outbox --thread of its own--> Zenoh, which may let it wait
+    event loop --bytes--> SendQueue --thread of its own--> Zenoh, which may let it wait
 
 Zenoh keeps the order of what one session sends another, and loses nothing while they are connected; the numbers are
 there to notice where it does.
@@ -92,7 +92,7 @@ class SendQueue:
         self._ended = False
         self._last_word: str | None = None
         self._done = self._loop.create_future()
-        self._thread = threading.Thread(target=self._work, name=f"dobot_async outbox {name}", daemon=True)
+        self._thread = threading.Thread(target=self._work, name=f"dobot_async send queue {name}", daemon=True)
         self._thread.start()
 
     def send(self, data: bytes) -> None:

@@ -205,6 +205,6 @@ def test_a_frame_may_be_too_long_for_the_arm() -> None:
 
 def test_the_stop_comes_first_and_no_group_blocks_it() -> None:
     assert BRIDGED.stopping[0].id == c.SET_QUEUED_CMD_FORCE_STOP_EXEC.id
-    blocked = set().union(*BRIDGED.denials.values())
+    blocked = set().union(*BRIDGED.deny_groups.values())
     assert not blocked & {frame.id for frame in BRIDGED.stopping}
     assert {150, 151, 152, 140, 160} <= blocked

@@ -487,7 +487,7 @@ def test_what_is_not_wholly_understood_is_a_write(line: bytes, kind: RequestKind
 )
 def test_however_a_command_is_written_it_is_denied(line: bytes) -> None:
     request = BridgedLine(line + b"\r")
-    assert BRIDGED.subject(request) in BRIDGED.denials["calibration"]
+    assert BRIDGED.subject(request) in BRIDGED.deny_groups["calibration"]
     assert BRIDGED.kind(request) is RequestKind.WRITE
 
 

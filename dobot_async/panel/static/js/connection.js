@@ -28,7 +28,7 @@ export class Connection {
     this.waiting = new Map();
     this.number = 0;
     this.tries = 0;
-    this.owedStop = null;
+    this.pendingStop = null;
     this.open();
     addEventListener("online", () => this.state !== "open" && this.open());
     addEventListener("offline", () => this.lose());
@@ -94,7 +94,7 @@ export class Connection {
       if (message.type === "hello") {
         this.tries = 0;
         this.became("open");
-        if (this.owedStop) this.stop();
+        if (this.pendingStop) this.stop();
       }
       this.hooks.receive(message);
     }
@@ -129,21 +129,21 @@ export class Connection {
 
   /** Stop all arms: said again until it is answered, and first of all on the next socket. */
   stop() {
-    this.owedStop ??= resolvers();
-    const owed = this.owedStop;
+    this.pendingStop ??= resolvers();
+    const pending = this.pendingStop;
     clearTimeout(this.stopTimer);
     if (this.state === "open") {
-      this.stopTimer = setTimeout(() => this.owedStop === owed && this.stop(), STOP_AGAIN);
+      this.stopTimer = setTimeout(() => this.pendingStop === pending && this.stop(), STOP_AGAIN);
       this.request("stop").then(
-        () => { this.forget(owed); owed.resolve(); },
-        failure => { if (failure.kind !== "link") { this.forget(owed); owed.reject(failure); } },
+        () => { this.forget(pending); pending.resolve(); },
+        failure => { if (failure.kind !== "link") { this.forget(pending); pending.reject(failure); } },
       );
     }
-    return owed.promise;
+    return pending.promise;
   }
 
-  forget(owed) {
-    if (this.owedStop === owed) this.owedStop = null;
+  forget(pending) {
+    if (this.pendingStop === pending) this.pendingStop = null;
   }
 }
 

@@ -10,7 +10,7 @@ export const texts = {
   tabs: { jog: "Jog", go: "Go to", tools: "Tools", teach: "Teach", draw: "Draw", status: "Status" },
   stop: {
     one: "Stop", all: "Stop all arms", hint: "Esc",
-    sending: "Stopping …", done: "Stopped", owed: "No connection. Stop is sent as soon as there is one.",
+    sending: "Stopping …", done: "Stopped", pending: "No connection. Stop is sent as soon as there is one.",
     failed: text => `The stop was not confirmed: ${text}`,
   },
   arm: { label: "Arm", simulated: "simulated" },

@@ -18,7 +18,7 @@ export function stopBar(app) {
     const mine = ++number;
     releaseAll("stopped");
     element.classList.add("pressed");
-    say(said, app.connection.state === "open" ? texts.stop.sending : texts.stop.owed);
+    say(said, app.connection.state === "open" ? texts.stop.sending : texts.stop.pending);
     try {
       await app.connection.stop();
       if (mine === number) say(said, texts.stop.done);

@@ -1,4 +1,4 @@
-"""Strangers at the ports of a bridge: silent, many, slow, and speaking something else. None of it reaches the arm."""
+"""Unauthenticated peers at a bridge: silent, many, slow, in another protocol. Nothing of theirs reaches the arm."""
 
 from __future__ import annotations
 

@@ -113,13 +113,13 @@ class Echo:
     def client(
         self,
         deliver: Callable[[bytes], None],
-        hang_up: Callable[[], None],
+        disconnect: Callable[[], None],
         *,
         ordered: bool,
-        hold: Callable[[bool], None] = lambda _: None,
+        pause_reading: Callable[[bool], None] = lambda _: None,
         name: str = "",
     ) -> EchoClient:
-        self.hang_ups.append(hang_up)
+        self.hang_ups.append(disconnect)
         return EchoClient(self, deliver)
 
     def leave(self, client: EchoClient) -> None:
@@ -143,7 +143,9 @@ async def test_both_ways_have_their_own_line_and_a_client_far_ahead_is_held() ->
     holds: list[bool] = []
     host = Echo()
     slow = RateLimited(host, BAUD)
-    client: RateLimitedPeer[EchoClient] = slow.client(received.extend, lambda: None, ordered=True, hold=holds.append)
+    client: RateLimitedPeer[EchoClient] = slow.client(
+        received.extend, lambda: None, ordered=True, pause_reading=holds.append
+    )
     client.send(bytes(AHEAD + 100))
     assert holds == [True]
     await asyncio.sleep((AHEAD + 100) * BYTE + TICK)

@@ -1,4 +1,4 @@
-"""Who is let in to a bridge: tokens on each transport, web pages, TLS; nothing of a stranger reaches the arm."""
+"""Who may connect to a bridge: tokens on each transport, web pages, TLS; nothing unauthenticated reaches the arm."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ async def names_itself(connection: Any) -> bool:
 
 
 async def stays_outside(rig: Rig, requests: int) -> None:
-    """Checks that a stranger was noticed, and that the arm was not."""
+    """Checks that an unauthenticated peer was noticed, and that the arm was not."""
     await until(lambda: rig.told("turned away"))
     assert rig.sim.arm.counters.requests == requests
     assert rig.told("connected") == []
