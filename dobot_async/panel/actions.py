@@ -56,7 +56,7 @@ def set_name(call: Call) -> None:
 
 
 ACTIONS: Mapping[str, Action] = {
-    "stop": Action(stop, lease="", arm=False),
+    "stop": Action(stop, lease="", arm=False, urgent=True),
     "check": Action(motions.check, lease=""),
     "outline": Action(motions.outline_at, lease=""),
     "preview": Action(files.preview, lease=""),
