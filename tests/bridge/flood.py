@@ -1,10 +1,10 @@
-"""Silent connections at each port of this package: memory, what is written, and whether a client with the token gets in.
+"""Silent connections at each port of this package: memory, lines written, and whether a client with the token gets in.
 
     python tests/bridge/flood.py [--connections 1100] [--seconds 30] [--ports tcp panel ...]
 
-Ports of a bridge, the panel, MCP by HTTP and the metrics. Who serves is a process of its own, with room for 1024 files as systems have it. The connections go to this computer's
-loopback interface, are closed in the end, and say nothing. Each port has to keep below 80 MB and 200 lines a minute,
-and to let a client in within 6 s.
+Ports of a bridge, the panel, MCP by HTTP and the metrics. Who serves is a process of its own, with room for 1024 files
+as systems have it. The connections go to this computer's loopback interface, are closed in the end, and say nothing.
+Each port has to keep below 80 MB and 200 lines a minute, and to let a client in within 6 s.
 """
 
 from __future__ import annotations
