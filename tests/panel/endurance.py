@@ -110,11 +110,13 @@ class Operator:
         rig: The arm and its panel.
         figures: Where it takes note.
         seed: Of what it does.
+        rest: Seconds after which the arm stands that nobody holds.
     """
 
-    def __init__(self, rig: Shown, figures: Figures, seed: int) -> None:
+    def __init__(self, rig: Shown, figures: Figures, seed: int, rest: float) -> None:
         self._rig = rig
         self._figures = figures
+        self._rest = rest
         self._random = random.Random(seed)
         self._ways: tuple[Callable[[Page, int], Awaitable[object]], ...] = (release, fall_silent, close, cut)
 
@@ -147,7 +149,7 @@ class Operator:
 
     async def _check_rest(self) -> None:
         """Count a motion that goes on without a hand."""
-        await asyncio.sleep(REST)
+        await asyncio.sleep(self._rest)
         before = self._rig.sim.arm.pose
         await asyncio.sleep(0.1)
         self._figures.orphans += before != self._rig.sim.arm.pose
@@ -175,9 +177,8 @@ async def cut(one: Page, _press: int) -> None:
             transport.shutdown(2)
 
 
-async def operate(rig: Shown, figures: Figures, until: float, seed: int) -> None:
+async def operate(operator: Operator, until: float) -> None:
     """Operators, one after the other."""
-    operator = Operator(rig, figures, seed)
     while time.monotonic() < until:
         await operator.work()
 
@@ -204,7 +205,9 @@ async def tell(figures: Figures, every: float = 30.0) -> None:
         sys.stdout.flush()
 
 
-async def endure(seconds: float, loss: float = 0.02, every: float = 5.0, seed: int = 1) -> Figures:
+async def endure(
+    seconds: float, *, loss: float = 0.02, every: float = 5.0, seed: int = 1, rest: float = REST
+) -> Figures:
     """Let it go on for some time; return what came of it."""
     figures = Figures()
     async with shown(line=Faults(loss=loss)) as rig:
@@ -216,7 +219,9 @@ async def endure(seconds: float, loss: float = 0.02, every: float = 5.0, seed: i
         until = time.monotonic() + seconds
         telling = asyncio.create_task(tell(figures))
         try:
-            await asyncio.gather(operate(rig, figures, until, seed), look_on(rig, figures, until, every))
+            await asyncio.gather(
+                operate(Operator(rig, figures, seed, rest), until), look_on(rig, figures, until, every)
+            )
         finally:
             telling.cancel()
             await asyncio.wait([telling])
@@ -234,7 +239,7 @@ def main() -> int:
     parser.add_argument("--every", type=float, default=5.0, help="seconds from one visit of the viewer to the next")
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
-    found = asyncio.run(endure(given.minutes * 60, given.loss, given.every, given.seed))
+    found = asyncio.run(endure(given.minutes * 60, loss=given.loss, every=given.every, seed=given.seed))
     sys.stdout.write(f"{found}: {'fine' if found.is_fine else 'NOT FINE'}\n")
     sys.stdout.write(json.dumps({"fine": found.is_fine, "presses": found.presses, "orphans": found.orphans}) + "\n")
     return not found.is_fine
