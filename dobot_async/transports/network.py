@@ -29,7 +29,7 @@ SYSTEM = "system"
 LONGEST_TOKEN = 200
 """Characters; with a frame behind it a token still fits into one datagram of any network."""
 LARGEST_FILE = 4096
-"""Bytes of a token file that are looked at."""
+"""Bytes of a token file; one that has more is none."""
 
 
 def secret(token: str) -> str:
@@ -48,7 +48,12 @@ def token_in(file: str | Path) -> str:
     """
     try:
         with Path(file).open("rb") as opened:  # which may be one without an end
-            return secret(opened.read(LARGEST_FILE).decode("ascii").strip())
+            found = opened.read(LARGEST_FILE + 1)
+
+        if len(found) > LARGEST_FILE:
+            raise ValueError
+
+        return secret(found.decode("ascii").strip())
     except OSError as error:
         raise ValueError(f"cannot read the token file {file}: {error.strerror}") from None
     except ValueError:
