@@ -127,7 +127,7 @@ class Entrance(asyncio.Protocol):
         self.address = str((transport.get_extra_info("peername") or ("?",))[0])
         if not self._keeper.connected(self):
             self.cut()
-        elif self._transport is None or self._transport.is_closing():
+        elif self._transport.is_closing():
             return  # it was the one that was cut
         elif self._keeper.tls:
             self._handshake = self._keeper.agree(self, self._transport)
