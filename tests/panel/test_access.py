@@ -365,6 +365,7 @@ async def test_who_never_asks_is_cut_and_keeps_nobody_out(rig: Shown, monkeypatc
 
 async def test_of_who_says_nothing_a_few_are_kept_with_tls_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dobot_async.panel.doorkeeper.HANDSHAKE", 60.0)
+    monkeypatch.setattr("dobot_async.panel.start.HANDSHAKE", 60.0, raising=False)  # wherever TLS is begun
     async with shown(certificate=CERTIFICATE) as rig:
         connections = [await asyncio.open_connection("127.0.0.1", rig.panel.port) for _ in range(PENDING + 20)]
         async with asyncio.timeout(20):
