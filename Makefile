@@ -109,6 +109,7 @@ promises: $(VENV)/.dev
 	PROMISES=all $(BIN)/python -m pytest -n auto tests/promises
 	MOMENTS=all $(BIN)/python -m pytest -n auto tests/fleet/test_past_a_stop.py
 	$(BIN)/python -W ignore tests/promises/stale.py --answers $(ANSWERS)
+	$(BIN)/python tests/panel/endurance.py --minutes 1
 
 # Guided by coverage if the extra `fuzz` (atheris) is installed.
 SECONDS ?= 60

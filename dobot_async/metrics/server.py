@@ -35,17 +35,19 @@ class MetricsPage:
     def __init__(self, text: Callable[[], Awaitable[bytes]], token: str | None) -> None:
         self._text = text
         self._token = token
-        self._asked: dict[asyncio.Task[None], None] = {}
+        self._asked: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
         self._reading = asyncio.Lock()
         self._told: tuple[float, bytes] | None = None
 
     def connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Somebody has connected."""
         if len(self._asked) >= AT_ONCE:
-            next(iter(self._asked)).cancel()
+            oldest = next(iter(self._asked))
+            self._asked.pop(oldest).transport.abort()  # at once: in a flood the next ones need its file
+            oldest.cancel()
 
         task = asyncio.create_task(self._serve(reader, writer), name="dobot_async metrics")
-        self._asked[task] = None
+        self._asked[task] = writer
         task.add_done_callback(lambda task: self._asked.pop(task, None))
 
     async def aclose(self) -> None:
@@ -128,7 +130,7 @@ async def serve_metrics(
 
     page = MetricsPage(text, token)
     try:
-        server = await asyncio.start_server(page.connected, host, port, limit=LONGEST)
+        server = await asyncio.start_server(page.connected, host, port, limit=LONGEST, backlog=AT_ONCE)
     except OSError as error:
         raise ConnectFailed(f"cannot serve metrics at {host}:{port}: {error.strerror or error}") from error
 

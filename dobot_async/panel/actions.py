@@ -56,7 +56,7 @@ def set_name(call: PageRequest) -> None:
 
 
 ACTIONS: Mapping[str, PanelAction] = {
-    "stop": PanelAction(stop, lease="", arm=False),
+    "stop": PanelAction(stop, lease="", arm=False, urgent=True),
     "check": PanelAction(motions.check, lease=""),
     "outline": PanelAction(motions.outline_at, lease=""),
     "preview": PanelAction(files.preview, lease=""),

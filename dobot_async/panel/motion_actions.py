@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import AbstractAsyncContextManager
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from dobot_async._core.util.text import printable
 from dobot_async.errors import DobotError
@@ -15,6 +15,9 @@ from dobot_async.panel.hold_to_run import HoldToRun, held
 from dobot_async.panel.problems import PanelRefusal
 from dobot_async.panel.reach import outline
 from dobot_async.panel.requests import PageRequest
+
+if TYPE_CHECKING:
+    from dobot_async.panel.station import Station
 
 __all__ = [
     "beat",
@@ -129,9 +132,7 @@ async def hold_on(
         why = printable(str(error), 500)
         raise
     finally:
-        if station.holds.get(hold.press) is hold:
-            del station.holds[hold.press]
-
+        forget(station, hold)
         call.session.tell(kind, arm=station.name, press=hold.press, state="ended", why=why)
 
     return {"why": why}
@@ -141,26 +142,35 @@ def begin_to_hold(
     call: PageRequest, hold: HoldToRun, begin: Callable[[], Coroutine[Any, Any, Any]]
 ) -> Coroutine[Any, Any, Any]:
     """Begin with a hold, at once or, if something else was held, when that has ended; beats count from now on."""
-    station, going = call.station, call.station.works.alone
+    station = call.station
     held_before = list(station.holds.values())
-    if going is None or not held_before:
-        station.holds[hold.press] = hold
-        try:
-            return begin()
-        except BaseException:
-            del station.holds[hold.press]
-            raise
-
     for each in held_before:
         each.end("another press")
 
     station.holds[hold.press] = hold
+    if station.works.alone is None or not held_before:
+        try:
+            return begin()
+        except BaseException:
+            forget(station, hold)
+            raise
 
     async def after() -> Any:
-        await asyncio.wait({going})
-        return await begin()
+        try:
+            while going := station.works.alone:  # it may be another press that has been waiting for the same
+                await asyncio.wait({going})
+
+            return await begin()
+        finally:
+            forget(station, hold)
 
     return after()
+
+
+def forget(station: Station, hold: HoldToRun) -> None:
+    """Take a hold off its arm, if none has taken its place."""
+    if station.holds.get(hold.press) is hold:
+        del station.holds[hold.press]
 
 
 def jog(call: PageRequest) -> Coroutine[Any, Any, Any]:

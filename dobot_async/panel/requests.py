@@ -67,11 +67,13 @@ class PanelAction:
         run: Does it: returns a value, or what is to be awaited.
         lease: "held": who asks has to hold the lease; "may": has to be an operator; "": anybody.
         arm: It is about one arm.
+        urgent: There is room for it, however much is under way.
     """
 
     run: Callable[[PageRequest], Any]
     lease: Literal["held", "may", ""] = "held"
     arm: bool = True
+    urgent: bool = False
 
 
 def verb(text: str, do: Callable[[ArmView], Coroutine[Any, Any, Any]]) -> PanelAction:

@@ -29,6 +29,8 @@ __all__ = ["PageSession"]
 logger = logging.getLogger("dobot_async.panel")
 RATE, BURST = 100.0, 200.0  # messages a second
 MOST_TASKS = 64
+MOST_STOPS = 16
+"""Stops have room of their own: an arm that has much to do can still be stopped."""
 STOPPED = {"kind": "stopped", "text": "it was stopped before it was done"}
 
 
@@ -54,6 +56,7 @@ class PageSession:
         self._press = -1
         self._rate = Allowance(RATE, asyncio.get_running_loop().time, most=BURST)
         self._tasks: set[asyncio.Task[None]] = set()
+        self._stops: set[asyncio.Task[None]] = set()
 
     def receive(self, text: str) -> None:
         """Take a message."""
@@ -103,7 +106,7 @@ class PageSession:
             station.works.begin_to_end()
 
         await asyncio.gather(*(station.lease.end(self, "its page has gone") for station in stations))
-        await asyncio.gather(*(cancel_and_join(task) for task in list(self._tasks)))
+        await asyncio.gather(*(cancel_and_join(task) for task in (*self._tasks, *self._stops)))
         self.state.leave(self)
         self.outlet.close()
 
@@ -125,21 +128,22 @@ class PageSession:
         if action.lease == "held" and station:
             station.lease.check(self)
 
-        if len(self._tasks) >= MOST_TASKS:
-            raise PanelRefusal("rate", f"{MOST_TASKS} things are under way: wait for their answers")
+        under_way, most = (self._stops, MOST_STOPS) if action.urgent else (self._tasks, MOST_TASKS)
+        if len(under_way) >= most:
+            raise PanelRefusal("rate", f"{most} of these are under way: wait for their answers")
 
         call = PageRequest(self, station, Arguments(message), number)
         found = action.run(call)
         if is_coroutine(found):
-            self._spawn(number, found)
+            self._spawn(number, found, under_way)
         else:
             self._reply(number, value=found)
 
-    def _spawn(self, number: int | None, doing: Coroutine[Any, Any, Any]) -> None:
+    def _spawn(self, number: int | None, doing: Coroutine[Any, Any, Any], under_way: set[asyncio.Task[None]]) -> None:
         """Do something that takes time, and answer when it is done."""
         task = asyncio.create_task(self._answer(number, doing), name=f"dobot_async panel call of {self.name}")
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        under_way.add(task)
+        task.add_done_callback(under_way.discard)
 
     async def _answer(self, number: int | None, doing: Coroutine[Any, Any, Any]) -> None:
         try:

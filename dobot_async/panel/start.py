@@ -17,7 +17,6 @@ from typing import Any
 from dobot_async import Arm, ConnectFailed, Fleet
 from dobot_async._core.util.events import Events
 from dobot_async._core.util.tasks import cancel_and_join, run_shielded
-from dobot_async.bridge.handshake import HANDSHAKE
 from dobot_async.bridge.listeners import served_with
 from dobot_async.fleet.member import Member
 from dobot_async.panel.access import Access, Role, is_loopback
@@ -204,10 +203,8 @@ async def panel(
         stack.push_async_callback(lambda: run_shielded(web.aclose()))
         stack.push_async_callback(lambda: run_shielded(state.aclose()))
         stack.callback(listener.close)
-        factory = await web.start()
-        server = await asyncio.get_running_loop().create_server(
-            factory, sock=listener, ssl=tls, ssl_handshake_timeout=HANDSHAKE if tls else None
-        )
+        factory = await web.start(tls)
+        server = await asyncio.get_running_loop().create_server(factory, sock=listener)
         stack.callback(server.close)
         state.start()
         if scene is not None:

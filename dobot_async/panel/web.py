@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import ssl
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
@@ -90,18 +91,18 @@ class Web:
             lingering_time=0.0,
         )
 
-    async def start(self) -> Callable[[], asyncio.BaseProtocol]:
-        """Get ready; return what makes the protocol of each connection."""
+    async def start(self, tls: ssl.SSLContext | None = None) -> Callable[[], asyncio.BaseProtocol]:
+        """Get ready; return what makes the protocol of each connection, which agrees upon TLS itself."""
         await self._runner.setup()
         server = self._runner.server
         assert server
-        self._keeper = PendingConnections(server, self._turned_away)
+        self._keeper = PendingConnections(server, self._turned_away, tls)
         return self._keeper
 
     async def aclose(self) -> None:
         """End all connections."""
         if self._keeper:
-            self._keeper.close()
+            await self._keeper.aclose()
 
         await self._runner.cleanup()
 

@@ -28,6 +28,8 @@ TOKEN_LINE = b"TOKEN %s\n"
 SYSTEM = "system"
 LONGEST_TOKEN = 200
 """Characters; with a frame behind it a token still fits into one datagram of any network."""
+LARGEST_FILE = 4096
+"""Bytes of a token file; one that has more is none."""
 
 
 def secret(token: str) -> str:
@@ -45,7 +47,10 @@ def token_in(file: str | Path) -> str:
         ValueError: There is no such file, or no token in it; the message shows nothing of what is.
     """
     try:
-        return secret(Path(file).read_bytes().decode("ascii").strip())
+        with Path(file).open("rb") as opened:  # which may be one without an end
+            found = opened.read(LARGEST_FILE + 1)
+
+        return secret(found.decode("ascii").strip() if len(found) <= LARGEST_FILE else "")
     except OSError as error:
         raise ValueError(f"cannot read the token file {file}: {error.strerror}") from None
     except ValueError:

@@ -3,20 +3,23 @@
     python tests/bridge/traffic.py [--minutes 10] [--programs 5] [--loss 0.003] [--corrupt 0.002] [--listen tcp ...]
 
 It compares a bridge, by each way in, with one program that does the same on the arm's line by itself, in real time and
-at the same time, each with an arm of its own. It prints a line every half minute: answers, failures, and the memory.
+at the same time, each with an arm and a process of its own: ways that shared one would wait for each other's Python,
+which threads, as Zenoh has them, do longer than an event loop does. It prints a line every half minute: answers,
+failures, and the memory.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import json
 import resource
 import sys
 import time
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +35,7 @@ from dobot_async.simulator.magician.body import MAGICIAN
 __all__ = ["FAMILIES", "Figures", "Programs", "bare", "through_a_bridge"]
 
 PAUSE = 0.05  # seconds between two reads of a program
+BARE = "bare"
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,6 +221,7 @@ async def measure(name: str, way: Any, arguments: argparse.Namespace) -> Total:
         programs: Programs = await stack.enter_async_context(way(sim))
         figures = programs.figures
         await asyncio.sleep(1)
+        figures.reads.clear()
         sim.faults.loss, sim.faults.corrupt = arguments.loss, arguments.corrupt
         began = last = time.monotonic()
         while (left := began + arguments.minutes * 60 - time.monotonic()) > 0:
@@ -227,27 +232,45 @@ async def measure(name: str, way: Any, arguments: argparse.Namespace) -> Total:
             total.unanswered += len(figures.reads) - answered
             total.lost = figures.failures["ConnectionLost"]
             line = f"{answered / (now - last):6.1f} answers/s, {len(figures.reads) - answered:3} unanswered"
-            sys.stdout.write(
+            sys.stderr.write(
                 f"{name:8} {now - began:5.0f} s: {line}, {figures.moves:6} motions, {dict(figures.failures)}, "
-                f"{memory():5.1f} MB in all\n"
+                f"{memory():5.1f} MB, {time.process_time():.1f} s of the processor\n"
             )
-            sys.stdout.flush()
             figures.reads.clear()
             last = now
 
     return total
 
 
+async def measured(way: str) -> Total:
+    """Measures one way in a process of its own."""
+    command = [sys.executable, *sys.argv, "--way", way]
+    process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
+    told, _ = await process.communicate()
+    if process.returncode:
+        raise SystemExit(f"{way} has failed")
+
+    return Total(**json.loads(told))
+
+
+async def one_way(arguments: argparse.Namespace) -> int:
+    """Measures one way in this process, and writes what came of it."""
+    listen, family, programs = arguments.way, arguments.family, arguments.programs
+    place = f"{listen}://127.0.0.1:0" if listen in {"tcp", "udp", "ws"} else listen
+
+    def way(sim: Simulation) -> Any:
+        if listen == BARE:
+            return bare(sim, family, programs)
+
+        return through_a_bridge(sim, family, programs, place)
+
+    json.dump(asdict(await measure(listen.partition(":")[0], way, arguments)), sys.stdout)
+    return 0
+
+
 async def main(arguments: argparse.Namespace) -> int:
     """Measures the bare line and each way in, all at the same time; returns how many of them fall short."""
-
-    def way_in(listen: str) -> Any:
-        place = f"{listen}://127.0.0.1:0" if listen in {"tcp", "udp", "ws"} else listen
-        return lambda sim: through_a_bridge(sim, arguments.family, arguments.programs, place)
-
-    ways = {"bare": lambda sim: bare(sim, arguments.family, arguments.programs)}
-    ways |= {listen.partition(":")[0]: way_in(listen) for listen in arguments.listen}
-    own, *others = await asyncio.gather(*(measure(name, way, arguments) for name, way in ways.items()))
+    own, *others = await asyncio.gather(*map(measured, (BARE, *arguments.listen)))
     short = 0
     for listen, found in zip(arguments.listen, others, strict=True):
         share = found.answered / own.answered
@@ -268,8 +291,10 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--corrupt", type=float, default=0.002)
     parser.add_argument("--family", choices=list(FAMILIES), default="magician")
     parser.add_argument("--listen", nargs="+", default=["tcp"], help="tcp, udp, ws, pty, zenoh://name")
+    parser.add_argument("--way", help=argparse.SUPPRESS)  # what a process of its own measures
     return parser.parse_args()
 
 
 if __name__ == "__main__":
-    sys.exit(asyncio.run(main(parse())))
+    given = parse()
+    sys.exit(asyncio.run(one_way(given) if given.way else main(given)))

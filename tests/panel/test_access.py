@@ -17,6 +17,7 @@ from panel_rig import Shown, browser, page, shown, until
 
 from dobot_async import ConnectFailed
 from dobot_async.arms.magician import commands as c
+from dobot_async.bridge.handshake import PENDING
 from dobot_async.panel import Role, panel
 from dobot_async.panel.access import Access
 from dobot_async.panel.pending_connections import MOST
@@ -360,6 +361,37 @@ async def test_who_never_asks_is_cut_and_keeps_nobody_out(rig: Shown, monkeypatc
                 writer.close()
 
         await one.get("ping")
+
+
+async def test_of_who_says_nothing_a_few_are_kept_with_tls_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dobot_async.panel.pending_connections.HANDSHAKE", 60.0)
+    monkeypatch.setattr("dobot_async.panel.start.HANDSHAKE", 60.0, raising=False)  # wherever TLS is begun
+    async with shown(certificate=CERTIFICATE) as rig:
+        connections = [await asyncio.open_connection("127.0.0.1", rig.panel.port) for _ in range(PENDING + 20)]
+        async with asyncio.timeout(20):
+            for reader, _ in connections[:20]:  # long before their time is over
+                with suppress(ConnectionError):
+                    assert not await reader.read()
+
+        async with browser() as http, http.get(rig.panel.operator_url, ssl=False) as answer:
+            assert answer.status == 200
+
+        for _, writer in connections:
+            writer.close()
+
+
+async def test_connections_that_have_gone_cost_nobody_his_place(rig: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dobot_async.panel.pending_connections.HANDSHAKE", 60.0)
+    reader, slow = await asyncio.open_connection("127.0.0.1", rig.panel.port)
+    for _ in range(PENDING + 10):
+        other, writer = await asyncio.open_connection("127.0.0.1", rig.panel.port)
+        writer.write(b"no HTTP\r\n\r\n")
+        await other.read()
+        writer.close()
+
+    slow.write(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{rig.panel.port}\r\n\r\n".encode())
+    assert (await reader.readline()).startswith(b"HTTP/1.1 401")
+    slow.close()
 
 
 async def test_secrets_are_in_no_log(rig: Shown, caplog: pytest.LogCaptureFixture) -> None:

@@ -103,6 +103,44 @@ async def test_another_press_takes_the_place_of_the_first() -> None:
         assert [each.value.cmd for each in jogs(sim)] == [c.JOGKey.BP_DOWN, c.JOGKey.BN_DOWN]
 
 
+async def test_of_presses_that_wait_for_the_first_to_end_the_newest_moves_it() -> None:
+    """On a line that takes its time, so that two more presses come before the first one has ended."""
+    async with (
+        simulate(faults=Faults(latency=0.05)) as sim,
+        desk_of({"arm": Member(sim.url, Magician)}) as (desk, join),
+    ):
+        page = await operator(join)
+        first, press = page.press("x+")
+        await beats(page, press, 0.3)
+        second, _ = page.press("x-")
+        await asyncio.sleep(0.02)
+        third, newest = page.press("y+")
+        before = sim.arm.pose.y
+        await beats(page, newest, 1.5)
+        for number in (first, second):
+            answer = page.reply(number)
+            assert answer
+            assert answer["value"] == {"why": "another press"}
+
+        assert not page.reply(third)
+        assert sim.arm.pose.y > before + 1
+        page.send("release", arm="arm", press=newest)
+        await page.answer(third)
+        assert not desk.stations["arm"].holds, "a press that is over is kept"
+
+
+async def test_a_press_is_not_kept_if_the_arm_is_busy() -> None:
+    async with simulate(speed=0.2) as sim, desk_of({"arm": Member(sim.url, Magician)}) as (desk, join):
+        page = await operator(join)
+        page.send("move_to", arm="arm", x=220.0, y=150.0, z=40.0)
+        for _ in range(3):
+            number, _ = page.press("y+")
+            assert (await page.answer(number))["error"]["kind"] == "busy"
+
+        assert not desk.stations["arm"].holds
+        assert not jogs(sim)
+
+
 async def test_a_press_that_is_over_is_not_revived() -> None:
     async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
         page = await operator(join)
@@ -286,6 +324,46 @@ async def test_a_stop_may_be_said_again_and_again() -> None:
 
         assert await stands(sim)
         assert sum("stops the arm" in each["text"] for each in viewer.of("log")) == 1
+
+
+async def test_a_page_that_has_much_under_way_can_stop_the_arm() -> None:
+    async with simulate(speed=0.2) as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
+        page = await operator(join)
+        for number in range(70):
+            page.send("move_to", arm="arm", x=200.0, y=150.0 * (-1) ** number, z=40.0)
+
+        await asyncio.sleep(1)
+        assert not await stands(sim)
+        refused = [each["error"]["kind"] for each in page.of("reply") if not each["ok"]]
+        assert set(refused) == {"rate"}
+        assert (await page.ask("stop"))["ok"]
+        await asyncio.sleep(BRAKES)
+        assert await stands(sim)
+        assert page.last("queue")["items"] == []
+        await asyncio.sleep(5)
+        assert await stands(sim)
+
+
+async def test_stops_without_end_are_bounded_and_leave_others_their_stop() -> None:
+    async with simulate() as sim, desk_of({"arm": Member(sim.url, Magician)}) as (_, join):
+        page, viewer = await operator(join), join(Role.VIEWER)
+        _, press = page.press("y+", speed=5)
+        await beats(page, press, 0.5)
+        sim.faults.silent = True
+        before = len(asyncio.all_tasks())
+        for _ in range(190):
+            viewer.send("stop")
+
+        await asyncio.sleep(1)
+        assert "rate" in {each["error"]["kind"] for each in viewer.of("reply")}
+        assert len(asyncio.all_tasks()) - before < 600
+        other = join(Role.VIEWER)
+        number = other.send("stop")
+        await asyncio.sleep(0.1)
+        sim.faults.silent = False
+        assert (await other.answer(number))["ok"]
+        await asyncio.sleep(BRAKES)
+        assert await stands(sim)
 
 
 async def test_a_bad_line_and_a_page_that_comes_and_goes_leave_no_motion_without_a_hand() -> None:

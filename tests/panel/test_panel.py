@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from endurance import endure
 from panel_rig import ARM, Shown, browser, page, shown, until
 
 from dobot_async import Box, Fleet, Magician, MotionStopped, MyCobot, PTPMode, UltraArm
@@ -480,6 +482,29 @@ async def test_the_arm_stands_when_the_program_of_the_page_is_killed() -> None:
         assert rig.sim.arm.pose == here
         (jog,) = [each for each in rig.sim.arm.executed if each.command is c.SET_JOG_CMD and each.value.cmd]
         assert jog.outcome == "done"
+
+
+async def test_a_page_that_answers_nothing_stops_its_arm_and_frees_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As behind a network that takes everything and gives nothing: no end of the connection ever comes."""
+    monkeypatch.setattr("dobot_async.panel.web.PINGS", 2.0)
+    async with shown(speed=0.5) as rig, browser() as http:
+        await (await http.get(rig.panel.operator_url)).read()
+        async with http.ws_connect(f"{rig.panel.url}ws", headers=rig.origin, autoping=False) as socket:
+            await socket.send_str(json.dumps({"do": "take_lease", "arm": ARM}))
+            await until(rig.panel.holder)
+            await socket.send_str(json.dumps({"do": "move_to", "arm": ARM, "x": 200.0, "y": 150.0, "z": 40.0}))
+            await until(lambda: rig.sim.arm.pose.y > 1)
+            await until(lambda: not rig.panel.holder())
+            before = rig.sim.arm.pose
+            await asyncio.sleep(0.3)
+            assert before == rig.sim.arm.pose
+            assert rig.panel.pages == 0
+
+
+async def test_pages_that_come_and_go_on_a_bad_line_leave_nothing() -> None:
+    found = await endure(60.0 if os.environ.get("PROMISES") == "all" else 1.0, every=2.0, rest=2.0)
+    assert found.presses
+    assert found.is_fine, str(found)
 
 
 async def test_the_panel_ends_with_what_it_moves() -> None:

@@ -202,6 +202,12 @@ def test_a_token_is_given_once() -> None:
     assert "not both" in refusal("tcp://10.0.0.1:1?token=geheim&token_file=/etc/token")
 
 
+def test_a_token_file_is_not_read_without_end(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    file.write_bytes(b"geheim-4711" + b" " * 5000)
+    assert "has no token" in refusal(f"tcp://10.0.0.1:1?token_file={file}")
+
+
 async def test_a_token_file_is_as_good_as_the_token(tmp_path: Path) -> None:
     file = tmp_path / "token"
     file.write_text(" geheim-4711\r\n")
