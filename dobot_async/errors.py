@@ -79,8 +79,8 @@ class ArmAlarm(DobotError):
 
     def __init__(self, message: str, alarms: Sequence[Any] = (), motions: Sequence[Any] = ()) -> None:
         super().__init__(message)
-        self.alarms = tuple(alarms)
-        self.motions = tuple(motions)
+        self.alarms: tuple[Any, ...] = tuple(alarms)
+        self.motions: tuple[Any, ...] = tuple(motions)
 
 
 class MotionStopped(DobotError):

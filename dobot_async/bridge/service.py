@@ -66,7 +66,7 @@ class Bridge(Generic[F]):
         self.link = link
         self._log = BridgeLog()
         self.events = self._log.events
-        self.stops = 0
+        self.stops: int = 0
         self.family = family
         self._denied = denied
         self._limits = limits

@@ -37,7 +37,7 @@ class Topic:
 
     def __init__(self, session: ZenohSession, key: str) -> None:
         zenoh = library()
-        self.watched = asyncio.Event()
+        self.watched: asyncio.Event = asyncio.Event()
         self.publisher = session.raw.declare_publisher(
             key,
             encoding=zenoh.Encoding.APPLICATION_JSON,

@@ -88,8 +88,8 @@ class ZenohListener:
     """
 
     def __init__(self, bridge: Bridge[Any], place: ZenohConfig) -> None:
-        self.keys = KeyExpressions(place.name)
-        self.session = ZenohSession(place, serving=True)
+        self.keys: KeyExpressions = KeyExpressions(place.name)
+        self.session: ZenohSession = ZenohSession(place, serving=True)
         self.bridge = bridge
         self._name = place.name
         self._present: dict[str, None] = {}
@@ -243,7 +243,7 @@ class ZenohConnection:
 
     def __init__(self, listener: ZenohListener, name: str, shown: str) -> None:
         self.name = name
-        self.outbox = SendQueue(listener.way(name, waits=True), partial(listener.cut, self), name)
+        self.outbox: SendQueue = SendQueue(listener.way(name, waits=True), partial(listener.cut, self), name)
         self._listener = listener
         self._numbers = Numbered()
         self._held = False

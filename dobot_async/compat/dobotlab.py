@@ -238,4 +238,4 @@ class Magician:
 
 
 Dobot = Magician
-magician = Magician()
+magician: Magician = Magician()

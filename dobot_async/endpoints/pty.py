@@ -48,7 +48,7 @@ class PseudoTerminal(Generic[P]):
         self._master, self._slave = os.openpty()
         make_raw(self._slave)
         os.set_blocking(self._master, False)
-        self.path = os.ttyname(self._slave)
+        self.path: str = os.ttyname(self._slave)
         self._unsent = bytearray()
         self._client: P | None = None
         self._deaf = False

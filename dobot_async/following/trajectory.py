@@ -70,7 +70,7 @@ class Trajectory:
                     )
 
         self.first, self.last = self._places[0], self._places[-1]
-        self.seconds = self._times[-1] - self._times[0]
+        self.seconds: float = self._times[-1] - self._times[0]
 
     def at(self, elapsed: float) -> TargetPoint:
         """Return the place after some seconds."""

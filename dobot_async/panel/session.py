@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PageSession"]
 
-logger = logging.getLogger("dobot_async.panel")
+logger: logging.Logger = logging.getLogger("dobot_async.panel")
 RATE, BURST = 100.0, 200.0  # messages a second
 MOST_TASKS = 64
 STOPPED = {"kind": "stopped", "text": "it was stopped before it was done"}
@@ -48,9 +48,9 @@ class PageSession:
         self.state = state
         self.role = role
         self.name = self._first_name = name
-        self.gone = False
+        self.gone: bool = False
         self.yields = True
-        self.outlet = Outlet()
+        self.outlet: Outlet = Outlet()
         self._press = -1
         self._rate = Allowance(RATE, asyncio.get_running_loop().time, most=BURST)
         self._tasks: set[asyncio.Task[None]] = set()

@@ -25,7 +25,7 @@ from typing import Any, Generic, TypeVar
 __all__ = ["Call", "Caller", "Own", "in_thread"]
 
 R = TypeVar("R")
-logger = logging.getLogger("dobot_async.sync")
+logger: logging.Logger = logging.getLogger("dobot_async.sync")
 
 PATIENCE = 4.0
 """Seconds that an interrupted call has to end: more than twice what a stop takes that nobody acknowledges."""

@@ -34,7 +34,7 @@ from dobot_async.teaching.recording import Gripper, Mode, Recording, TaughtStep,
 
 __all__ = ["read_playback", "write_playback"]
 
-logger = logging.getLogger("dobot_async.teaching")
+logger: logging.Logger = logging.getLogger("dobot_async.teaching")
 
 HEADS = ("DobotType", "StudioVersion")
 STYLES: tuple[Mode, ...] = ("jump", "point", "line", "arc")

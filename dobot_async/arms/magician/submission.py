@@ -56,9 +56,9 @@ class Submission:
         self.cleanup = link.cleanup
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
         self.on_motion: Hooks[[Motion]] = Hooks()
-        self.status = ArmStatus(link, self._restarted)
-        self.ledger = QueueLedger()
-        self.space = QueueSpace(self.status)
+        self.status: ArmStatus = ArmStatus(link, self._restarted)
+        self.ledger: QueueLedger = QueueLedger()
+        self.space: QueueSpace = QueueSpace(self.status)
         self._link = link
         self._window = window
         self._check = check

@@ -77,7 +77,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         self._executor.keeper = self._runner.keeper
         self._jogger = Jogger(self._runner, link.cleanup)
         self.queue = UltraArmQueue(self._executor, pump)
-        self.following = UltraArmFollowing(self._runner, tolerance, lambda: self.queue)
+        self.following: UltraArmFollowing = UltraArmFollowing(self._runner, tolerance, lambda: self.queue)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
 
     @classmethod

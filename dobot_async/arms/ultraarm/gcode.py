@@ -102,7 +102,7 @@ class GCodeReader:
     """
 
     def __init__(self, limits: c.UltraArmLimits, keeper: UltraArmKeeper | None = None) -> None:
-        self.ended = False
+        self.ended: bool = False
         self._keeper = keeper
         self._stand = Stand()
         self._limits = limits

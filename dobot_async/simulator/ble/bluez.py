@@ -34,7 +34,7 @@ class BlueZ:
         self._bus = bus
         self._scanning: set[str] = set()
         self._modules: dict[str, BleModule] = {}
-        self.objects = Objects(bus, TYPES)
+        self.objects: Objects = Objects(bus, TYPES)
 
     async def start(self) -> None:
         """Appears on the bus."""

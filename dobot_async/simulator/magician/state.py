@@ -124,7 +124,7 @@ class Motor:
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
-        self.speed = 0
+        self.speed: int = 0
         self._now = now
         self._since = now()
         self._pulses = 0.0
@@ -160,11 +160,11 @@ class State:
 
     def __init__(self, now: Callable[[], float], limits: JointLimits, *, homed: bool) -> None:
         self.limits = limits
-        self.homed = homed
-        self.motors = (Motor(now), Motor(now))
-        self.lost_steps = [0.0] * 4
+        self.homed: bool = homed
+        self.motors: tuple[Motor, Motor] = (Motor(now), Motor(now))
+        self.lost_steps: list[float] = [0.0] * 4
         self.left_at = (0.0,) * 5 if homed else LEFT_AT
-        self.levelled = 0.0
+        self.levelled: float = 0.0
         self.networks: Mapping[str, str] | None = None
         self._now = now
         self._registers = {(row.id, 0): value for row, value in FLASH.items()}

@@ -40,7 +40,7 @@ class SegmentPlanner:
 
     def __init__(self, model: CobotModel, play: float = 0.0) -> None:
         self.model = model
-        self.play = tuple(play * sign for sign in SIGNS[: model.joints])
+        self.play: tuple[float, ...] = tuple(play * sign for sign in SIGNS[: model.joints])
         self.limits = list(model.joint_limits)
         self.solver = KINEMATICS[model.name]
 

@@ -101,7 +101,7 @@ class CommandEffects:
 
     def __init__(self, registers: Registers) -> None:
         self.registers = registers
-        self.missed = 0
+        self.missed: int = 0
 
     def make(self, row: Command[Any, Any], value: Any) -> Work:
         """Returns what the command does when its turn comes."""

@@ -41,8 +41,8 @@ class KeyExpressions:
     """The keys of one arm."""
 
     def __init__(self, name: str) -> None:
-        self.arm = f"{ROOT}/{name}/@arm"
-        self.link = f"{ROOT}/{name}/@link"
+        self.arm: str = f"{ROOT}/{name}/@arm"
+        self.link: str = f"{ROOT}/{name}/@link"
         self._name = name
 
     def reading(self, topic: str) -> str:
@@ -58,7 +58,7 @@ class ZenohSession:
     """
 
     def __init__(self, place: ZenohConfig, *, serving: bool = False) -> None:
-        self.crossing = LoopBridge()
+        self.crossing: LoopBridge = LoopBridge()
         self._place = place
         self._serving = serving
         self._zenoh: zenoh.Session | None = None
