@@ -22,6 +22,7 @@ from urllib.parse import SplitResult
 
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async._core.util.text import printable
+from dobot_async.bridge.client import Client
 from dobot_async.bridge.limits import Allowance
 from dobot_async.bridge.service import Bridge
 from dobot_async.bridge.telemetry import Telemetry
@@ -248,7 +249,9 @@ class ZenohConnection:
         self._numbers = Numbered()
         self._held = False
         self._waiting = bytearray()
-        self.peer = listener.bridge.client(self.outbox.send, self._hang_up, ordered=True, hold=self._hold, name=shown)
+        self.peer: Client[Any] = listener.bridge.client(
+            self.outbox.send, self._hang_up, ordered=True, hold=self._hold, name=shown
+        )
 
     def send(self, message: bytes) -> None:
         """It has sent something."""

@@ -47,7 +47,8 @@ class PageSession:
     def __init__(self, state: PanelState, role: Role, name: str) -> None:
         self.state = state
         self.role = role
-        self.name = self._first_name = name
+        self.name: str = name
+        self._first_name = name
         self.gone: bool = False
         self.yields = True
         self.outlet: Outlet = Outlet()

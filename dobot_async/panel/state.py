@@ -45,7 +45,9 @@ class PanelState:
         stop_all: Callable[[], Awaitable[None]] | None,
     ) -> None:
         self.hub: Hub = Hub()
-        self.stations: dict[str, Station] = {name: Station(name, source, self.hub, self._told) for name, source in sources.items()}
+        self.stations: dict[str, Station] = {
+            name: Station(name, source, self.hub, self._told) for name, source in sources.items()
+        }
         self.drawings: Drawings = Drawings()
         self.ticks: Ticks = Ticks()
         self.sessions: set[PageSession] = set()

@@ -76,7 +76,7 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
         if workspace:
             self._executor.keeper = MagicianKeeper(workspace, self._stand, self._executor.status.ask)
 
-        self.queue = MagicianQueue(self._executor)
+        self.queue: MagicianQueue = MagicianQueue(self._executor)
         self.following: MagicianFollowing = MagicianFollowing(link, self._executor, lambda: self.queue)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from dobot_async._core.protocol.contract import Parser
 from dobot_async._core.protocol.transport import Transport
@@ -163,11 +163,11 @@ class BridgedMagician(ByKey[Frame]):
     model = "magician"
     header = f.HEADER
     filler: bytes = f.FILLER
-    encode = staticmethod(f.request)
+    encode: Final = staticmethod(f.request)
     proves_stop = True
     greeting: Frame = f.request(c.GET_END_EFFECTOR_PARAMS, b"", queued=False)
     barriers: tuple[Frame, ...] = tuple(f.request(row, b"", queued=False) for row in BARRIERS)
-    stopping = tuple(f.request(row, row.request.encode(value), queued=False) for row, value in LEAVING)
+    stopping: Sequence[Frame] = tuple(f.request(row, row.request.encode(value), queued=False) for row, value in LEAVING)
     readings: dict[str, TelemetryRead[Frame]] = {  # noqa: RUF012 - a table
         "pose": TelemetryRead(f.request(c.GET_POSE, b"", queued=False), 0.2, told_pose),
         "motion": TelemetryRead(MagicianWatch().question, 0.2, told_index),

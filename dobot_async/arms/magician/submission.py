@@ -20,6 +20,7 @@ from dobot_async._core.protocol.wire import Command, Number, u64
 from dobot_async._core.queue.executor import Entry, MotionSource, alarmed
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.hooks import Hooks
+from dobot_async._core.util.tasks import Cleanup
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import Alarm, faults
 from dobot_async.arms.magician.datagrams import DatagramGuard, Surplus
@@ -53,7 +54,7 @@ class Submission:
     keeper: MagicianKeeper | None = None
 
     def __init__(self, link: Link[Frame], window: int, check: Callable[[Any], None]) -> None:
-        self.cleanup = link.cleanup
+        self.cleanup: Cleanup = link.cleanup
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
         self.on_motion: Hooks[[Motion]] = Hooks()
         self.status: ArmStatus = ArmStatus(link, self._restarted)

@@ -10,7 +10,7 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 from dobot_async._core.protocol.contract import Parser
 from dobot_async._core.protocol.transport import Transport
@@ -88,15 +88,17 @@ class BridgedCobot(ByKey[Frame]):
 
     filler = b""
     header = f.HEADER
-    encode = staticmethod(f.request)
+    encode: Final = staticmethod(f.request)
     proves_stop = False
 
     def __init__(self, model: CobotModel) -> None:
         self.model: str = model.name
         self.barriers: tuple[Frame, ...] = tuple(request(model, row) for row in BARRIERS if row in model.rows)
         self.greeting: Frame = request(model, c.IS_POWER_ON)
-        self.stopping = (request(model, c.STOP),)
-        self.denials: dict[str, frozenset[int]] = {"calibration": frozenset(model.rows[row].id for row in CALIBRATION if row in model.rows)}
+        self.stopping: Sequence[Frame] = (request(model, c.STOP),)
+        self.denials: dict[str, frozenset[int]] = {
+            "calibration": frozenset(model.rows[row].id for row in CALIBRATION if row in model.rows)
+        }
         self.readings: dict[str, TelemetryRead[Frame]] = {
             "pose": TelemetryRead(request(model, c.GET_COORDS), 0.2, self._told_coords),
             "joints": TelemetryRead(request(model, c.GET_ANGLES), 0.2, self._told_angles),

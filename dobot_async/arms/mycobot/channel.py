@@ -42,7 +42,7 @@ class Unechoed(Generic[R]):
     """The layout of an answer, but for the bytes of its request."""
 
     def __init__(self, layout: Layout[R], request: bytes) -> None:
-        self.encode = layout.encode
+        self.encode: Callable[[R], bytes] = layout.encode
         self._layout = layout
         self._request = request
 

@@ -83,7 +83,7 @@ class CobotStrategy:
     check_every: float = 1.0
 
     def __init__(self, channel: Channel, runner: CobotRunner, tolerance: Tolerance, speed: int) -> None:
-        self.axes = AXES[: len(channel.model.reach)]
+        self.axes: tuple[str, ...] = AXES[: len(channel.model.reach)]
         self.joints: int = channel.model.joints
         self.tolerance: tuple[float, float] = (tolerance[1], tolerance[0])
         self._channel = channel

@@ -135,8 +135,15 @@ class BridgedUltraArm:
 
     def __init__(self) -> None:
         self.greeting: BridgedLine = question(c.GET_QUEUE_SIZE)
-        self.stopping: tuple[BridgedLine, BridgedLine, BridgedLine] = (question(c.JOG_STOP), question(c.LASER_OFF), question(c.SET_PWM, c.PWM(0)))
-        self.insisting: tuple[BridgedLine, BridgedLine, BridgedLine, BridgedLine] = (question(c.RELEASE), *self.stopping)
+        self.stopping: tuple[BridgedLine, BridgedLine, BridgedLine] = (
+            question(c.JOG_STOP),
+            question(c.LASER_OFF),
+            question(c.SET_PWM, c.PWM(0)),
+        )
+        self.insisting: tuple[BridgedLine, BridgedLine, BridgedLine, BridgedLine] = (
+            question(c.RELEASE),
+            *self.stopping,
+        )
         self.denials: dict[str, frozenset[str]] = {"calibration": frozenset(row.name for row in CALIBRATION)}
         self.readings: dict[str, TelemetryRead[BridgedLine]] = {
             "pose": TelemetryRead(question(c.GET_COORDS), 0.2, lambda reply: told(c.GET_COORDS, reply)),

@@ -77,7 +77,8 @@ class UltraArmRunner:
         self.state: ArmState = ArmState()
         self.status: UltraArmPoller = UltraArmPoller(self.channel.read, lambda: link.stats)
         self.stopper: UltraArmStopper = UltraArmStopper(self.status, self.state, on_stop)
-        self.busy = self.jogging = False
+        self.busy: bool = False
+        self.jogging: bool = False
         self._commands = Acknowledged(self.channel, self.status)
         self._link = link
         self.limits = limits

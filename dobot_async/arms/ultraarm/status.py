@@ -55,7 +55,8 @@ class UltraArmPoller:
         self.last: Status | None = None
         self.rests: int = 0
         self.rest_since: float = -math.inf
-        self.busy = self.set_out = False
+        self.busy: bool = False
+        self.set_out: bool = False
         self._read = read
         self._stats = stats
         self._goal: Goal | None = None

@@ -67,7 +67,7 @@ class MyCobotBody:
         self.errors: dict[int, int] = {}
         self.error: int = 0
         self.servos_lost = False
-        self.color = c.RGB(0, 0, 0)
+        self.color: c.RGB = c.RGB(0, 0, 0)
         origin = (0.0,) * len(model.reach)
         self.settings: dict[Command[Any, Any], Any] = {
             c.SET_FRESH_MODE: False,

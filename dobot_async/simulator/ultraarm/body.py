@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.ultraarm import commands as c
@@ -162,8 +162,8 @@ def plus(a: Vector, b: Vector) -> Vector:
 class Geometry:
     """The arm's kinematics, as ways in space need them."""
 
-    forward = staticmethod(forward)
-    inverse = staticmethod(inverse)
+    forward: Final = staticmethod(forward)
+    inverse: Final = staticmethod(inverse)
 
 
 def move_coords(registers: Registers, joints: Vector, value: c.CoordsMove) -> Activity:
