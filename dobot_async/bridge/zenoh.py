@@ -30,6 +30,7 @@ from dobot_async.errors import ConnectFailed
 from dobot_async.transports.zenoh.config import ZenohConfig, address, library
 from dobot_async.transports.zenoh.messages import DATA, END, Lost, Numbered, SendQueue
 from dobot_async.transports.zenoh.session import VERSION, KeyExpressions, ZenohSession
+from dobot_async.transports.zenoh.typed import answering
 
 if TYPE_CHECKING:
     import zenoh
@@ -200,16 +201,16 @@ class ZenohListener:
             return
 
         name = last(query.key_expr)
-        given = introduction(query)
+        given, answer = introduction(query), answering(query)
         if given is None:
-            query.reply_err(f"this server speaks version {VERSION}; bring both to one release".encode())
+            answer.reply_err(f"this server speaks version {VERSION}; bring both to one release".encode())
         elif name not in self._present:
-            query.reply_err(b"its liveliness token has not been seen")
+            answer.reply_err(b"its liveliness token has not been seen")
         else:
             if name not in self._connections:
                 self._connections[name] = ZenohConnection(self, name, f"zenoh:{given}")
 
-            query.reply(query.key_expr, b"")
+            answer.reply(query.key_expr, b"")
 
     def _heard(self, message: tuple[str, bytes]) -> None:
         """A client has sent something; who is none any more, or not yet, is told so.

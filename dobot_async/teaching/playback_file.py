@@ -167,7 +167,7 @@ def step_of(element: Element, reader: PlaybackReader) -> TaughtStep:
             reader.remark(what, element.line)
 
     row = Row(element, reader.file)
-    mode = row.choice(0, STYLES)
+    mode: Mode | None = row.choice(0, STYLES)
     if mode is None:
         raise row.wrong(0, "is missing")
 

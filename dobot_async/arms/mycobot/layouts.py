@@ -62,7 +62,7 @@ class Fixed:
 
     def encode(self, name: str, value: Any, sizes: Sizes) -> bytes:
         """Return the bytes of a field's value."""
-        if value is None and self.optional:
+        if self.optional and value is None:
             return b""
 
         values: list[Any] = [value] if self.count is None else list(value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.ultraarm import commands as c
@@ -162,8 +162,13 @@ def plus(a: Vector, b: Vector) -> Vector:
 class Geometry:
     """The arm's kinematics, as ways in space need them."""
 
-    forward: Final = staticmethod(forward)
-    inverse: Final = staticmethod(inverse)
+    def forward(self, joints: Vector) -> Vector:
+        """The point of these joints."""
+        return forward(joints)
+
+    def inverse(self, point: Vector) -> Vector:
+        """The joints of this point; raises DeviceFault where there are none."""
+        return inverse(point)
 
 
 def move_coords(registers: Registers, joints: Vector, value: c.CoordsMove) -> Activity:

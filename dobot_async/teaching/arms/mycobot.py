@@ -66,7 +66,7 @@ class TaughtCobot(TaughtArm):
 
     def __init__(self, arm: MyCobot) -> None:
         super().__init__(arm)
-        self.limits: CobotRecordingLimits = CobotRecordingLimits(arm.model)
+        self.limits: RecordingLimits = CobotRecordingLimits(arm.model)
         self.turn: str = self.limits.axes[-1]
 
     @property

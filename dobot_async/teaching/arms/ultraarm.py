@@ -54,7 +54,7 @@ class TaughtUltraArm(TaughtArm):
 
     def __init__(self, arm: UltraArm) -> None:
         super().__init__(arm)
-        self.limits: UltraArmRecordingLimits = UltraArmRecordingLimits(arm.limits)
+        self.limits: RecordingLimits = UltraArmRecordingLimits(arm.limits)
 
     async def move(self, step: TaughtStep, percent: float | None) -> None:
         """G0, G1 or M11."""

@@ -6,7 +6,7 @@ faces. Here each gets a sentence, and a word on whether trying again can help.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,7 +44,7 @@ NOT_FOUND = (
 )
 
 
-REASONS = {
+REASONS: Mapping[Reason, str] = {
     Reason.NO_BLUETOOTH: NO_ADAPTER,
     Reason.NO_BLE_CENTRAL_ROLE: NO_CENTRAL,
     Reason.POWERED_OFF: OFF,
