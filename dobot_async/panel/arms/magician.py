@@ -100,7 +100,7 @@ class MagicianView(ArmView):
     async def set_speed(self, percent: float) -> None:
         """The ratios of PTP."""
         await self.arm.set_speed(percent)
-        self.percent = percent
+        self.percent: float | None = percent
 
     async def conveyor(self, speed: int, motor: int) -> None:
         """A stepper."""
