@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 from contextlib import AsyncExitStack, suppress
-from importlib.util import find_spec
+from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 from dobot_async.endpoints.listeners import Host, Peer
@@ -24,8 +24,10 @@ async def on_pty(host: Host[Any], stack: AsyncExitStack, *, lasting: bool = True
     Raises:
         ValueError: This system has no pseudo-terminals.
     """
-    if find_spec("termios") is None:  # Windows has neither it nor what follows
-        raise ValueError(NONE_HERE)
+    try:
+        import_module("termios")  # Windows has neither it nor what follows
+    except ImportError:
+        raise ValueError(NONE_HERE) from None
 
     port = PseudoTerminal(host, lasting=lasting)
     stack.callback(port.close)
