@@ -1,6 +1,6 @@
 # make demo      a pick-and-place cycle on the built-in simulator, over a real pseudo-terminal
 # make panel     a simulated arm in the browser: make panel [ARM_URL=sim:] [OPTIONS="--port 0"]
-# make test      ruff, mypy and the whole test suite
+# make test      ruff, mypy, pyright and the whole test suite
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
 # make docs      the site, in build/site, and what is promised of it; a warning is an error
@@ -30,10 +30,13 @@ panel: $(VENV)/.panel
 
 test: check pytest
 
+# --verifytypes looks for libraries with the first python of the PATH, and does not see through an editable install.
 check: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/basedpyright --pythonpath $(BIN)/python
+	PYTHONPATH="$(CURDIR)" PATH="$(abspath $(BIN)):$$PATH" $(BIN)/basedpyright --verifytypes dobot_async --ignoreexternal
 	$(BIN)/lint-imports
 
 sync: $(VENV)/.dev

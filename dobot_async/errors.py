@@ -72,15 +72,16 @@ class ArmAlarm(DobotError):
     """The arm raised alarms and ended, or will not run, the motion.
 
     Attributes:
-        alarms: What is set, each with its code, cause and remedy.
+        alarms: What is set: of a Magician and a myCobot each with its code, name, cause and remedy; of an ultraArm,
+            which has no alarms of its own, what was seen, in words when printed.
         motions: Of a queue, in order: the first motion that is not known to be done, up to the last that may have
-            failed.
+            failed; while the arm follows, the target.
     """
 
-    def __init__(self, message: str, alarms: Sequence[Any] = (), motions: Sequence[Any] = ()) -> None:
+    def __init__(self, message: str, alarms: Sequence[Any] = (), motions: Sequence[object] = ()) -> None:
         super().__init__(message)
-        self.alarms = tuple(alarms)
-        self.motions = tuple(motions)
+        self.alarms: tuple[Any, ...] = tuple(alarms)  # a type of each family: whoever connected knows which
+        self.motions: tuple[object, ...] = tuple(motions)
 
 
 class MotionStopped(DobotError):

@@ -62,7 +62,11 @@ class ArmVerbs(Protocol[T_co]):
     """
 
     def home(self, *, timeout: float | None = None) -> T_co:
-        """Drive to the home position, where the arm finds its place if it has to."""
+        """Drive to the home position, where the arm finds its place if it has to.
+
+        Args:
+            timeout: Seconds; None waits as long as it takes.
+        """
         ...
 
     def move_to(
@@ -73,11 +77,25 @@ class ArmVerbs(Protocol[T_co]):
         *,
         timeout: float | None = None,
     ) -> T_co:
-        """Move the tool to a point, mm; coordinates that are not given stay as they are."""
+        """Move the tool to a point, mm; coordinates that are not given stay as they are.
+
+        Args:
+            x: mm, forward.
+            y: mm, to the left.
+            z: mm, up.
+            timeout: Seconds; None waits as long as it takes.
+        """
         ...
 
     def move_by(self, x: float = 0.0, y: float = 0.0, z: float = 0.0, *, timeout: float | None = None) -> T_co:
-        """Move the tool by mm from where it will be then."""
+        """Move the tool by mm from where it will be then.
+
+        Args:
+            x: mm, forward.
+            y: mm, to the left.
+            z: mm, up.
+            timeout: Seconds; None waits as long as it takes.
+        """
         ...
 
     @property
@@ -86,19 +104,39 @@ class ArmVerbs(Protocol[T_co]):
         ...
 
     def wait(self, seconds: float, *, timeout: float | None = None) -> T_co:
-        """Hold the queue for a time, 0 s or more."""
+        """Hold the queue for a time, 0 s or more.
+
+        Args:
+            seconds: 0 or more.
+            timeout: Seconds, for the waiting as well.
+        """
         ...
 
     def gripper(self, closed: bool, *, timeout: float | None = None) -> T_co:
-        """Close or open the gripper."""
+        """Close or open the gripper.
+
+        Args:
+            closed: Whether to close it.
+            timeout: Seconds.
+        """
         ...
 
     def gripper_to(self, percent: float, *, timeout: float | None = None) -> T_co:
-        """Open the gripper to 0 (closed) to 100 (open) percent."""
+        """Open the gripper to 0 (closed) to 100 (open) percent.
+
+        Args:
+            percent: 0 (closed) to 100 (open).
+            timeout: Seconds.
+        """
         ...
 
     def suction(self, on: bool, *, timeout: float | None = None) -> T_co:
-        """Suck, or let go."""
+        """Suck, or let go.
+
+        Args:
+            on: Whether to suck.
+            timeout: Seconds.
+        """
         ...
 
 
@@ -117,9 +155,20 @@ class ArmQueue(ArmVerbs[Coroutine[Any, Any, Motion]], Protocol):
     @property
     def outcomes(self) -> Mapping[str, int]:
         """How many motions ended, by how: "done", or the name of the error that they raise."""
+        ...
 
     async def put(self, command: Command[Q, Any], value: Q, *, timeout: float | None = None) -> Motion:
-        """Queue any row of the command table that may be queued."""
+        """Queue any row of the command table that may be queued.
+
+        Args:
+            command: A row of the family's table.
+            value: What the row takes; None if that is nothing.
+            timeout: Seconds to wait for room in the queue.
+
+        Raises:
+            ValueError: The value is out of range, or the row may not be queued; nothing was sent.
+            TypeError: The value is of the wrong type.
+        """
         ...
 
     def batch(self, *, timeout: float | None = None) -> AbstractAsyncContextManager[ArmBatch]:
@@ -156,7 +205,17 @@ class Arm(ArmVerbs[Coroutine[Any, Any, None]], Protocol):
         ...
 
     async def request(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
-        """Send any row of the family's command table at once, and return the arm's answer."""
+        """Send any row of the family's command table at once, and return the arm's answer.
+
+        Args:
+            command: A row of the table.
+            value: What the row takes; None if that is nothing.
+            timeout: Seconds to wait for the answer.
+
+        Raises:
+            ValueError: The value is out of range, or the connection only reads; nothing was sent.
+            TypeError: The value is of the wrong type.
+        """
         ...
 
     async def get_pose(self, *, timeout: float | None = None) -> ArmPose:
@@ -182,10 +241,25 @@ class Arm(ArmVerbs[Coroutine[Any, Any, None]], Protocol):
         """Empty the queue, clear the alarms, and let the arm take new commands."""
 
     async def jog(self, direction: str, seconds: float) -> None:
-        """Jog for a time, then stop; directions are "x+", "x-", "y+", ..., "j1+", "j2-"."""
+        """Jog for a time, then stop; directions are "x+", "x-", "y+", ..., "j1+", "j2-".
+
+        Args:
+            direction: A word; what an arm knows depends on its family.
+            seconds: 0 or more.
+
+        Raises:
+            ValueError: The arm knows no such direction.
+        """
 
     def jogging(self, direction: str) -> AbstractAsyncContextManager[None]:
-        """Jog until the block ends, however it ends."""
+        """Jog until the block ends, however it ends.
+
+        Args:
+            direction: As for `jog`.
+
+        Raises:
+            ValueError: The arm knows no such direction.
+        """
         ...
 
     @property

@@ -65,11 +65,11 @@ class Client(Generic[F]):
         limits: Limits,
     ) -> None:
         self.name = name
-        self.gone = False
-        self.left = False
+        self.gone: bool = False
+        self.left: bool = False
         self.ordered = ordered
         self.watch: ClientWatch[F] = family.watch()
-        self.reads = Admission(ON_THE_LINE)
+        self.reads: Admission = Admission(ON_THE_LINE)
         self._handler = handler
         self._family = family
         self._deliver = deliver

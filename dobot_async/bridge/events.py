@@ -13,7 +13,7 @@ from dobot_async.bridge.limits import Allowance
 
 __all__ = ["BridgeEvent", "BridgeLog"]
 
-logger = logging.getLogger("dobot_async.bridge")
+logger: logging.Logger = logging.getLogger("dobot_async.bridge")
 RATES = {"turned away": 0.5, "connected": 1.0, "left": 1.0, "cut": 1.0, "refused": 2.0}
 """Events a second of a kind that whoever reaches a port can cause; more of them are counted, and not told."""
 BURST = 40

@@ -134,7 +134,7 @@ class PendingConnection(ABC):
     ) -> None:
         self.peer: Peer | None = None
         self.name = name
-        self.authenticator = handshakes.authenticator
+        self.authenticator: Authenticator = handshakes.authenticator
         self._handshakes = handshakes
         self._write = deliver
         self._disconnect = disconnect

@@ -23,9 +23,10 @@ from typing import Any, Generic, Literal, TypeVar
 from dobot_async._core.link.admission import Priority
 from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.contract import Frame, LinkState
+from dobot_async._core.util.events import Events
 from dobot_async.arms.bridge_adapter import BridgeAdapter, RequestKind
 from dobot_async.bridge.client import Client
-from dobot_async.bridge.events import BridgeLog
+from dobot_async.bridge.events import BridgeEvent, BridgeLog
 from dobot_async.bridge.lease import Lease
 from dobot_async.bridge.limits import Limits
 from dobot_async.bridge.line import ArmLink
@@ -65,8 +66,8 @@ class Bridge(Generic[F]):
         self.token: str | None = None
         self.link = link
         self._log = BridgeLog()
-        self.events = self._log.events
-        self.stops = 0
+        self.events: Events[BridgeEvent] = self._log.events
+        self.stops: int = 0
         self.family = family
         self._denied = denied
         self._limits = limits

@@ -20,6 +20,7 @@ from dobot_async.bridge.service import Bridge
 from dobot_async.errors import DobotError
 from dobot_async.transports.zenoh.config import library
 from dobot_async.transports.zenoh.session import KeyExpressions, ZenohSession
+from dobot_async.transports.zenoh.typed import TopicPublisher
 
 __all__ = ["LINK_PERIOD", "Telemetry"]
 
@@ -37,17 +38,18 @@ class Topic:
 
     def __init__(self, session: ZenohSession, key: str) -> None:
         zenoh = library()
-        self.watched = asyncio.Event()
-        self.publisher = session.raw.declare_publisher(
+        self.watched: asyncio.Event = asyncio.Event()
+        publisher = session.raw.declare_publisher(
             key,
             encoding=zenoh.Encoding.APPLICATION_JSON,
             congestion_control=zenoh.CongestionControl.DROP,
             priority=zenoh.Priority.DATA_LOW,
         )
-        self._listener = self.publisher.declare_matching_listener(
+        self.publisher: TopicPublisher = publisher
+        self._listener: object = publisher.declare_matching_listener(
             session.crossing.to(self._notice, lambda status: status.matching)
         )
-        self._notice(self.publisher.matching_status)
+        self._notice(publisher.matching_status)
 
     def _notice(self, watched: bool) -> None:
         if watched:

@@ -22,6 +22,7 @@ from urllib.parse import SplitResult
 
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async._core.util.text import printable
+from dobot_async.bridge.client import Client
 from dobot_async.bridge.limits import Allowance
 from dobot_async.bridge.service import Bridge
 from dobot_async.bridge.telemetry import Telemetry
@@ -29,6 +30,7 @@ from dobot_async.errors import ConnectFailed
 from dobot_async.transports.zenoh.config import ZenohConfig, address, library
 from dobot_async.transports.zenoh.messages import DATA, END, Lost, Numbered, SendQueue
 from dobot_async.transports.zenoh.session import VERSION, KeyExpressions, ZenohSession
+from dobot_async.transports.zenoh.typed import answering
 
 if TYPE_CHECKING:
     import zenoh
@@ -88,8 +90,8 @@ class ZenohListener:
     """
 
     def __init__(self, bridge: Bridge[Any], place: ZenohConfig) -> None:
-        self.keys = KeyExpressions(place.name)
-        self.session = ZenohSession(place, serving=True)
+        self.keys: KeyExpressions = KeyExpressions(place.name)
+        self.session: ZenohSession = ZenohSession(place, serving=True)
         self.bridge = bridge
         self._name = place.name
         self._present: dict[str, None] = {}
@@ -199,16 +201,16 @@ class ZenohListener:
             return
 
         name = last(query.key_expr)
-        given = introduction(query)
+        given, answer = introduction(query), answering(query)
         if given is None:
-            query.reply_err(f"this server speaks version {VERSION}; bring both to one release".encode())
+            answer.reply_err(f"this server speaks version {VERSION}; bring both to one release".encode())
         elif name not in self._present:
-            query.reply_err(b"its liveliness token has not been seen")
+            answer.reply_err(b"its liveliness token has not been seen")
         else:
             if name not in self._connections:
                 self._connections[name] = ZenohConnection(self, name, f"zenoh:{given}")
 
-            query.reply(query.key_expr, b"")
+            answer.reply(query.key_expr, b"")
 
     def _heard(self, message: tuple[str, bytes]) -> None:
         """A client has sent something; who is none any more, or not yet, is told so.
@@ -243,12 +245,12 @@ class ZenohConnection:
 
     def __init__(self, listener: ZenohListener, name: str, shown: str) -> None:
         self.name = name
-        self.outbox = SendQueue(listener.way(name, waits=True), partial(listener.cut, self), name)
+        self.outbox: SendQueue = SendQueue(listener.way(name, waits=True), partial(listener.cut, self), name)
         self._listener = listener
         self._numbers = Numbered()
         self._held = False
         self._waiting = bytearray()
-        self.peer = listener.bridge.client(
+        self.peer: Client[Any] = listener.bridge.client(
             self.outbox.send, self._disconnect, ordered=True, pause_reading=self._pause_reading, name=shown
         )
 

@@ -119,7 +119,11 @@ class Job:
         if isinstance(arm, Magician):
             await arm.set_end_effector(self.effector)
 
-        report = ProgressLines(self.session.output.say) if count is None else lambda told: count(told.strokes)
+        def tick(told: Progress) -> None:
+            if count:
+                count(told.strokes)
+
+        report = tick if count else ProgressLines(self.session.output.say)
         try:
             drawing = CommandDrawing(arm, self.path, self.plane, tool=self.tool, progress=report, **self.options)
             await drawing.run(first=self.begin.stroke, point=self.begin.point)

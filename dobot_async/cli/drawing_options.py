@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 import click
 
@@ -71,9 +71,9 @@ def several(*options: Callable[[F], F]) -> Callable[[F], F]:
     return decorate
 
 
-in_file = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+in_file: Final = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 
-with_paper = several(
+with_paper: Final = several(
     click.option(
         "--at",
         nargs=3,
@@ -128,16 +128,18 @@ with_paper = several(
     click.option("--dry-run", is_flag=True, help="Only check it, and estimate the time: nothing is sent."),
 )
 
-with_pen = several(
+with_pen: Final = several(
     click.option(
         "--press", type=NOT_BELOW_ZERO, default=0.0, help="mm below the paper at full power, for a pen on a spring."
     ),
     click.option("--power", type=PERCENT, help="Percent of the file's pressure; needs --press."),
 )
 
-with_laser = click.option("--power", type=PERCENT, help="Percent of the file's power, which is full unless it says.")
+with_laser: Final = click.option(
+    "--power", type=PERCENT, help="Percent of the file's power, which is full unless it says."
+)
 
-about_pictures = several(
+about_pictures: Final = several(
     click.option(
         "--mode",
         type=click.Choice(MODES),

@@ -67,7 +67,7 @@ class KeyReader:
         self._news = asyncio.Event()
         self._text = ""
         self._timer: asyncio.TimerHandle | None = None
-        self.closed = False
+        self.closed: bool = False
         self._loop.add_reader(descriptor, self._readable)
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from dobot_async._core.util.plain import plain
+from dobot_async._core.util.plain import is_row, is_table, plain
 from dobot_async.errors import ArmAlarm
 
 __all__ = ["Output", "words"]
@@ -117,10 +117,10 @@ class Output:
 def words(value: Any) -> str:
     """Returns a value on one line, as people read it."""
     value = plain(value)
-    if isinstance(value, dict):
+    if is_table(value):
         return ", ".join(f"{name} {words(each)}" for name, each in value.items()) or "nothing"
 
-    if isinstance(value, list):
+    if is_row(value):
         return f"({', '.join(map(words, value))})" if value else "none"
 
     return "nothing" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

@@ -64,7 +64,7 @@ class HostPort(click.ParamType[tuple[str, int]]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, int]:
         """Reads HOST:PORT."""
         if isinstance(value, tuple):
-            return value
+            return cast("tuple[str, int]", value)
 
         try:
             return host_and_port(str(value))

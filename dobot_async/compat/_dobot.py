@@ -37,7 +37,7 @@ class BaseDobot(RawDobot):
     """
 
     def __init__(self, port: str | None = None) -> None:
-        self.session = CompatSession(port)
+        self.session: CompatSession = CompatSession(port)
         with self.session.opening():
             self._set_ptp_joint_params(200, 200, 200, 200, 200, 200, 200, 200)
             self._set_ptp_coordinate_params(velocity=200, acceleration=200)

@@ -59,7 +59,10 @@ class CustomPosition:
     def __init__(
         self, x: float | None = None, y: float | None = None, z: float | None = None, r: float | None = None
     ) -> None:
-        self.x, self.y, self.z, self.r = x, y, z, r
+        self.x: float | None = x
+        self.y: float | None = y
+        self.z: float | None = z
+        self.r: float | None = r
 
 
 class GPIOPort(IntEnum):

@@ -48,7 +48,7 @@ class CompatSession:
     """
 
     def __init__(self, port: str | None = None) -> None:
-        self.url = url_of(port)
+        self.url: str = url_of(port)
         self._block = sync.Magician.connect(self.url)
         SIGNALS.install()  # first, so that sync leaves them to this
         try:

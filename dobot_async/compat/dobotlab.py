@@ -32,7 +32,8 @@ class Magician:
         port: A port's name ("COM3", "/dev/ttyUSB0"), an address or a URL; nothing for the first arm that there is.
     """
 
-    Stepper1, Stepper2 = 0, 1
+    Stepper1: int = 0
+    Stepper2: int = 1
 
     def __init__(self, port: str | None = None) -> None:
         self._port = port
@@ -238,4 +239,4 @@ class Magician:
 
 
 Dobot = Magician
-magician = Magician()
+magician: Magician = Magician()

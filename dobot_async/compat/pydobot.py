@@ -23,7 +23,7 @@ __all__ = ["MODE_PTP", "Alarm", "Dobot", "DobotException", "Joints", "PTPMode", 
 
 DobotException = DobotError
 MODE_PTP = PTPMode
-enums = SimpleNamespace(PTPMode=PTPMode)
+enums: SimpleNamespace = SimpleNamespace(PTPMode=PTPMode)
 """pydobot's module of numbers."""
 
 

@@ -35,7 +35,7 @@ __all__ = [
 
 DobotException = DobotError
 MODE_PTP = PTPMode
-logger = logging.getLogger("dobot_async.compat")
+logger: logging.Logger = logging.getLogger("dobot_async.compat")
 
 
 class Dobot(BaseDobot):

@@ -34,7 +34,7 @@ SOURCES: Mapping[str, DiscoverySource] = MappingProxyType(
 )
 """The sources, by name, in the order in which they tell."""
 
-logger = logging.getLogger(__name__)
+logger: logging.Logger = logging.getLogger(__name__)
 PATIENCE = 5.0  # seconds that a source may need on top, to begin and to clean up
 
 

@@ -90,7 +90,7 @@ class ReplySocket(asyncio.DatagramProtocol):
 
     def __init__(self) -> None:
         self.errors: list[Exception] = []
-        self.heard = 0
+        self.heard: int = 0
         self._answers: asyncio.Queue[Found] = asyncio.Queue(BACKLOG)
 
     async def open(self, address: str, stack: AsyncExitStack) -> asyncio.DatagramTransport:

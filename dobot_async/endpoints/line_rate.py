@@ -87,7 +87,7 @@ class RateLimitedPeer(Generic[P]):
         pause_reading: Callable[[bool], None],
         leave: Callable[[P], None],
     ) -> None:
-        self.back = RateLimitedLine(baud, deliver)
+        self.back: RateLimitedLine = RateLimitedLine(baud, deliver)
         self.peer: P | None = None
         self._there = RateLimitedLine(baud, self._arrived)
         self._disconnect = disconnect

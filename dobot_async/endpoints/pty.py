@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 from contextlib import AsyncExitStack, suppress
+from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 from dobot_async.endpoints.listeners import Host, Peer
@@ -24,7 +25,7 @@ async def on_pty(host: Host[Any], stack: AsyncExitStack, *, lasting: bool = True
         ValueError: This system has no pseudo-terminals.
     """
     try:
-        import termios  # noqa: F401, PLC0415 - Windows has neither it nor what follows
+        import_module("termios")  # Windows has neither it nor what follows
     except ImportError:
         raise ValueError(NONE_HERE) from None
 
@@ -48,7 +49,7 @@ class PseudoTerminal(Generic[P]):
         self._master, self._slave = os.openpty()
         make_raw(self._slave)
         os.set_blocking(self._master, False)
-        self.path = os.ttyname(self._slave)
+        self.path: str = os.ttyname(self._slave)
         self._unsent = bytearray()
         self._client: P | None = None
         self._ignoring = False

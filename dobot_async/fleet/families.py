@@ -69,7 +69,7 @@ class FleetMagician(Magician):
     def __init__(self, link: Any, **options: Any) -> None:
         super().__init__(link, **options)
         self._executor.on_unknown = Hooks()  # it told the queue that this one replaces
-        self.queue: FleetMagicianQueue = FleetMagicianQueue(self._executor)
+        self.queue: FleetMagicianQueue = FleetMagicianQueue(self._executor)  # pyright: ignore[reportIncompatibleVariableOverride] - only set here
 
     @property
     def restarts(self) -> int:
@@ -120,7 +120,7 @@ class FleetMyCobot(MyCobot):
     def __init__(self, link: Any, *arguments: Any, **options: Any) -> None:
         super().__init__(link, *arguments, **options)
         self._executor.on_unknown = Hooks()
-        self.queue: FleetCobotQueue = FleetCobotQueue(self._executor, self.model)
+        self.queue: FleetCobotQueue = FleetCobotQueue(self._executor, self.model)  # pyright: ignore[reportIncompatibleVariableOverride] - only set here
 
     @asynccontextmanager
     async def jogging(self, direction: str, **options: Any) -> AsyncGenerator[None]:
@@ -135,7 +135,7 @@ class FleetUltraArm(UltraArm):
     def __init__(self, link: Any, **options: Any) -> None:
         super().__init__(link, **options)
         self._executor.on_unknown = Hooks()
-        self.queue: FleetUltraArmQueue = FleetUltraArmQueue(self._executor, self.pump)
+        self.queue: FleetUltraArmQueue = FleetUltraArmQueue(self._executor, self.pump)  # pyright: ignore[reportIncompatibleVariableOverride] - only set here
 
     @property
     def homed(self) -> bool:

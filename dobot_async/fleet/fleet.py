@@ -157,11 +157,27 @@ class Fleet(Programs[A]):
         return self._fleet_arm(name).member.base
 
     def to_cell(self, name: str, x: float, y: float, z: float, r: float = 0.0) -> Place:
-        """Returns where in the cell a place of an arm is."""
+        """Returns where in the cell a place of an arm is.
+
+        Args:
+            name: Of the arm.
+            x: mm, as the arm counts.
+            y: mm.
+            z: mm.
+            r: Degrees.
+        """
         return self.base(name).to_cell(x, y, z, r)
 
     def to_arm(self, name: str, x: float, y: float, z: float, r: float = 0.0) -> Place:
-        """Returns what a place of the cell is for an arm."""
+        """Returns what a place of the cell is for an arm.
+
+        Args:
+            name: Of the arm.
+            x: mm, as the cell counts.
+            y: mm.
+            z: mm.
+            r: Degrees.
+        """
         return self.base(name).to_arm(x, y, z, r)
 
     async def stop(self, *, timeout: float = STAYING) -> None:

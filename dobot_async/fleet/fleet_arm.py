@@ -24,7 +24,7 @@ from dobot_async.fleet.member import Member
 from dobot_async.fleet.planned_steps import PlannedStep, PlannedSteps
 from dobot_async.fleet.queue import FleetQueue
 from dobot_async.fleet.turn import Turn
-from dobot_async.fleet.zone_locks import ZoneRequest
+from dobot_async.fleet.zone_locks import ZoneHolder, ZoneRequest
 from dobot_async.fleet.zones import Zones, here
 
 __all__ = ["FleetArm", "Member", "tell_to_stop"]
@@ -65,10 +65,11 @@ class FleetArm:
         self.name = name
         self.member = member
         self.family: FleetFamily = family_of(member.kind)
-        self.holder = zones.arms[name]
+        self.holder: ZoneHolder = zones.arms[name]
         self.guard: Guard[Any] | None = None
         self.stopped: DobotError | None = None
-        self.commands = self.stops_on_error = False
+        self.commands: bool = False
+        self.stops_on_error: bool = False
         self._arm: Arm | None = None
         self._zones = zones
         self._failed = failed

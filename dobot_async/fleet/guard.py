@@ -61,7 +61,7 @@ class Guard(ZoneTracker[S]):
         limits: FleetLimits,
     ) -> None:
         super().__init__(steps, planner, queue, zones, holder, base=base, clearance=clearance)
-        self.patient = mode == "wait"
+        self.patient: bool = mode == "wait"
         self._limits = limits
 
     async def plan(self, motions: Sequence[Motion]) -> PlannedSteps[S]:

@@ -28,7 +28,7 @@ from dobot_async.following.strategy import Strategy
 
 __all__ = ["MAX_SPEED", "MAX_TURN", "RATE", "STALE", "follow_target"]
 
-logger = logging.getLogger("dobot_async.following")
+logger: logging.Logger = logging.getLogger("dobot_async.following")
 RATE, MAX_SPEED, MAX_TURN, STALE = 30.0, 100.0, 90.0, 0.3
 FASTEST = 200.0  # setpoints per second
 FOLLOWING: Command[None, None] = Command(

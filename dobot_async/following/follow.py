@@ -71,7 +71,7 @@ class Follow:
 
     def __init__(self, strategy: Strategy, motion: Motion, pace: FollowLimits, outages: Any) -> None:
         self.motion = motion
-        self.sent = 0
+        self.sent: int = 0
         self._strategy = strategy
         self._pace = pace
         self._outages = outages  # returns how often the link was lost

@@ -69,8 +69,9 @@ class Trajectory:
                         f"needed to get there in time, and {most:g} are allowed"
                     )
 
-        self.first, self.last = self._places[0], self._places[-1]
-        self.seconds = self._times[-1] - self._times[0]
+        self.first: TargetPoint = self._places[0]
+        self.last: TargetPoint = self._places[-1]
+        self.seconds: float = self._times[-1] - self._times[0]
 
     def at(self, elapsed: float) -> TargetPoint:
         """Return the place after some seconds."""

@@ -32,7 +32,7 @@ from dobot_async.transports.keep_alive import keep_alive
 
 __all__ = ["serve_http"]
 
-logger = logging.getLogger("dobot_async.mcp")
+logger: logging.Logger = logging.getLogger("dobot_async.mcp")
 PATH = "/mcp"
 LARGEST = 1 << 20  # bytes of a request
 CONNECTIONS, SESSIONS = 64, 16

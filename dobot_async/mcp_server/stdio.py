@@ -26,7 +26,7 @@ from dobot_async.mcp_server.server import ArmServer, Messages
 
 __all__ = ["serve_stdio"]
 
-logger = logging.getLogger("dobot_async.mcp")
+logger: logging.Logger = logging.getLogger("dobot_async.mcp")
 LONGEST = 4 << 20
 """Bytes of a line; who sends a longer one is cut off."""
 

@@ -31,7 +31,7 @@ from dobot_async.remote import RemoteArm, Works, parse_action
 
 __all__ = ["CommandHandler", "MqttSession"]
 
-logger = logging.getLogger("dobot_async.mqtt")
+logger: logging.Logger = logging.getLogger("dobot_async.mqtt")
 LONGEST = 1 << 18  # bytes of a message
 REMEMBERED = 1024  # commands whose ids are known
 SHORTEST, USUAL, MOST = 1.0, 5.0, 60.0
@@ -51,7 +51,7 @@ class MqttSession:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.gone = False
+        self.gone: bool = False
         self.timer: asyncio.TimerHandle | None = None
         self.works: set[asyncio.Task[None]] = set()
 

@@ -30,7 +30,7 @@ from dobot_async.remote import RemoteArm, Works, state_told
 
 __all__ = ["Gateway"]
 
-logger = logging.getLogger("dobot_async.mqtt")
+logger: logging.Logger = logging.getLogger("dobot_async.mqtt")
 KEEP_ALIVE = 5  # seconds
 PATIENCE = 5.0  # seconds for an answer of the broker
 AT_ONCE = 64  # messages that wait to be published; of more the oldest are dropped
@@ -69,7 +69,7 @@ class Gateway:
     ) -> None:
         site = works.site
         self.check(list(site.arms), base=base, identifier=identifier, discovery=discovery, interval=interval)
-        self.connected = asyncio.Event()
+        self.connected: asyncio.Event = asyncio.Event()
         self._works = works
         self._broker = broker
         self._will = will_topic(base, identifier or "-".join(site.arms)[:64])

@@ -65,7 +65,7 @@ class AccessDenied(Exception):
     def __init__(self, status: int, text: str, words: str = "") -> None:
         super().__init__(text)
         self.status = status
-        self.words = words or text
+        self.words: str = words or text
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from dobot_async.panel.problems import PanelRefusal
 __all__ = ["ArmTask", "ArmTasks"]
 
 MOST = 64
-numbers = itertools.count(1)
+numbers: itertools.count[int] = itertools.count(1)
 
 
 @dataclass(eq=False)

@@ -34,7 +34,7 @@ class Ticks:
     """
 
     def __init__(self) -> None:
-        self.number = 0
+        self.number: int = 0
         self._now = asyncio.get_running_loop().time
         self._sent: deque[tuple[int, float]] = deque(maxlen=KEPT)
 

@@ -46,7 +46,7 @@ class OperatorLease:
         self, begin: Callable[[], Awaitable[None]], end: Callable[[], Awaitable[None]], changed: Callable[[str], None]
     ) -> None:
         self.holder: Operator | None = None
-        self.freed = asyncio.Event()
+        self.freed: asyncio.Event = asyncio.Event()
         self.freed.set()
         self._begin = begin
         self._end = end

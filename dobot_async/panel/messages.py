@@ -50,7 +50,7 @@ class Outlet:
     """
 
     def __init__(self) -> None:
-        self.closed = False
+        self.closed: bool = False
         self._in_order: deque[str] = deque()
         self._newest: dict[Hashable, str] = {}
         self._news = asyncio.Event()
@@ -103,7 +103,7 @@ class Hub:
     """
 
     def __init__(self) -> None:
-        self.watched = asyncio.Event()
+        self.watched: asyncio.Event = asyncio.Event()
         self.lines: Events[Mapping[str, Any]] = Events()
         self._outlets: set[Outlet] = set()
         self._shown: dict[Hashable, str] = {}

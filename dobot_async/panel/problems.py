@@ -21,7 +21,7 @@ from dobot_async.errors import (
 
 __all__ = ["PanelRefusal", "told"]
 
-logger = logging.getLogger("dobot_async.panel")
+logger: logging.Logger = logging.getLogger("dobot_async.panel")
 LONGEST = 2000  # characters of a message
 KINDS: tuple[tuple[type[BaseException], str], ...] = (
     (ArmAlarm, "alarm"),

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PageSession"]
 
-logger = logging.getLogger("dobot_async.panel")
+logger: logging.Logger = logging.getLogger("dobot_async.panel")
 RATE, BURST = 100.0, 200.0  # messages a second
 MOST_TASKS = 64
 MOST_STOPS = 16
@@ -49,10 +49,11 @@ class PageSession:
     def __init__(self, state: PanelState, role: Role, name: str) -> None:
         self.state = state
         self.role = role
-        self.name = self._first_name = name
-        self.gone = False
+        self.name: str = name
+        self._first_name = name
+        self.gone: bool = False
         self.yields = True
-        self.outlet = Outlet()
+        self.outlet: Outlet = Outlet()
         self._press = -1
         self._rate = Allowance(RATE, asyncio.get_running_loop().time, most=BURST)
         self._tasks: set[asyncio.Task[None]] = set()

@@ -44,10 +44,12 @@ class PanelState:
         scene: bool,
         stop_all: Callable[[], Awaitable[None]] | None,
     ) -> None:
-        self.hub = Hub()
-        self.stations = {name: Station(name, source, self.hub, self._told) for name, source in sources.items()}
-        self.drawings = Drawings()
-        self.ticks = Ticks()
+        self.hub: Hub = Hub()
+        self.stations: dict[str, Station] = {
+            name: Station(name, source, self.hub, self._told) for name, source in sources.items()
+        }
+        self.drawings: Drawings = Drawings()
+        self.ticks: Ticks = Ticks()
         self.sessions: set[PageSession] = set()
         self._zones = zones
         self._scene = scene

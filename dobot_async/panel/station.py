@@ -34,7 +34,7 @@ from dobot_async.panel.taught_list import Taught
 
 __all__ = ["Station"]
 
-logger = logging.getLogger("dobot_async.panel")
+logger: logging.Logger = logging.getLogger("dobot_async.panel")
 RETRY = 2.0  # seconds until an arm that did not answer is tried again
 WAY_OUT = 1.9  # seconds for all that is put in order when a lease ends, on a line that is dead as well
 AT_LEAST = 0.1  # seconds of them for what comes last
@@ -59,12 +59,12 @@ class Station:
         self.name = name
         self.source = source
         self.hub = hub
-        self.lease = OperatorLease(self._begin_lease, self._end_lease, self._lease_changed)
-        self.works = ArmTasks(self._works_changed)
-        self.taught = Taught(self)
+        self.lease: OperatorLease = OperatorLease(self._begin_lease, self._end_lease, self._lease_changed)
+        self.works: ArmTasks = ArmTasks(self._works_changed)
+        self.taught: Taught = Taught(self)
         self.holds: dict[int, HoldToRun] = {}
         self.follow: Any = None
-        self.armed_until = 0.0
+        self.armed_until: float = 0.0
         self.watched_inputs: tuple[int, ...] = ()
         self._told = told
         self._now = asyncio.get_running_loop().time

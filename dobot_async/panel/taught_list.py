@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Taught"]
 
 MOST = 1000  # steps
-numbers = itertools.count(1)
+numbers: itertools.count[int] = itertools.count(1)
 CHANGES = ("mode", "pause", "name", "suction", "gripper")
 
 

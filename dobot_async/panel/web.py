@@ -31,7 +31,7 @@ from dobot_async.panel.static_files import StaticFiles
 
 __all__ = ["Web"]
 
-logger = logging.getLogger("dobot_async.panel")
+logger: logging.Logger = logging.getLogger("dobot_async.panel")
 STATIC = Path(__file__).parent / "static"
 METRICS = "/metrics"
 LARGEST_MESSAGE = 4096  # bytes, in characters of a page

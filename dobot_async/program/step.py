@@ -43,7 +43,7 @@ class ProgramError(ValueError):
 
     def __init__(self, problems: Sequence[tuple[int, str]]) -> None:
         super().__init__("\n".join(f"line {number}: {problem}" for number, problem in problems))
-        self.problems = tuple(problems)
+        self.problems: tuple[tuple[int, str], ...] = tuple(problems)
 
     @property
     def summary(self) -> str:

@@ -19,7 +19,7 @@ from dobot_async.remote.site import RemoteArm, Site
 
 __all__ = ["Busy", "Tell", "Works"]
 
-logger = logging.getLogger("dobot_async.remote")
+logger: logging.Logger = logging.getLogger("dobot_async.remote")
 BEAT = 0.5
 """Seconds between two reports of progress."""
 

@@ -35,7 +35,7 @@ MyCobotModel = Literal[
 
 MODELS: Parts[Callable[..., Any]] = Parts("simulator")
 """The simulated arms by name: each is made with a clock, and has a `session()` for each client."""
-BLE_OPTIONS = {"name": str, "address": str, "interval": float, "mtu": int, "packets": int}
+BLE_OPTIONS: dict[str, type] = {"name": str, "address": str, "interval": float, "mtu": int, "packets": int}
 PTY_OPTIONS = {"baud": int}
 
 

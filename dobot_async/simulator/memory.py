@@ -17,7 +17,7 @@ __all__ = ["MemoryTransport", "in_memory", "running"]
 BUFFER = 1 << 16
 LEAST_REORDER_WINDOW = 0.005
 
-names = itertools.count(1)
+names: itertools.count[int] = itertools.count(1)
 running: WeakValueDictionary[str, Simulation[Any]] = WeakValueDictionary()
 """The simulations of this process, by the host of their `sim://` URLs."""
 

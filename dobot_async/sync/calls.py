@@ -25,7 +25,7 @@ from typing import Any, Generic, TypeVar
 __all__ = ["Call", "Caller", "Own", "in_thread"]
 
 R = TypeVar("R")
-logger = logging.getLogger("dobot_async.sync")
+logger: logging.Logger = logging.getLogger("dobot_async.sync")
 
 PATIENCE = 4.0
 """Seconds that an interrupted call has to end: more than twice what a stop takes that nobody acknowledges."""
@@ -36,7 +36,7 @@ GRACE = 1.5
 SLICE = 0.1 if sys.platform == "win32" else -1
 """Seconds after which who waits looks for signals, where the system does not wake him for them; -1 for never."""
 
-own = threading.local()
+own: threading.local = threading.local()
 """The `Own` of each thread."""
 
 
@@ -55,7 +55,8 @@ class Call(Generic[R]):
     __slots__ = ("_done", "_interrupted", "_make", "_task", "begun", "ended", "error", "value")
 
     def __init__(self, make: Callable[[], Awaitable[R]]) -> None:
-        self.begun = self.ended = False
+        self.begun: bool = False
+        self.ended: bool = False
         self.error: BaseException | None = None
         self.value: R
         self._make = make

@@ -145,7 +145,8 @@ class Fleet(Twin[AsyncFleet[Any]], Generic[A]):
         """Returns what the fleet was told of an arm before it was connected."""
         told = self.asynchronous.member(name)
         given: dict[str, Any] = {field.name: getattr(told, field.name) for field in fields(told)}
-        return Member(**{**given, "kind": blocking_of(told.kind)})
+        given["kind"] = blocking_of(told.kind)
+        return Member(**given)
 
     @property
     def zones(self) -> Mapping[str, Shape | None]:

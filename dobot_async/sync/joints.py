@@ -27,7 +27,7 @@ from dobot_async.sync.mycobot import MyCobot
 
 __all__ = ["JointFollower", "limits_of_cobot", "limits_of_magician"]
 
-logger = logging.getLogger("dobot_async.sync")
+logger: logging.Logger = logging.getLogger("dobot_async.sync")
 Range = tuple[float, float]
 
 

@@ -399,17 +399,33 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
     def get_input(self, address: int, *, timeout: float | None = None) -> bool:
         """Returns the level of a digital input (1 to 20). Manual 2.16.4.
 
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            timeout: Seconds.
+
         Raises:
             ValueError: The pin is not configured as an input; see `configure_io`.
         """
         return PORTAL.run(lambda: self.asynchronous.get_input(address, timeout=timeout))
 
     def get_output(self, address: int, *, timeout: float | None = None) -> bool:
-        """Returns the level that a digital output (1 to 20) was set to. Manual 2.16.2."""
+        """Returns the level that a digital output (1 to 20) was set to. Manual 2.16.2.
+
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: An argument is out of range; nothing was sent.
+        """
         return PORTAL.run(lambda: self.asynchronous.get_output(address, timeout=timeout))
 
     def get_adc(self, address: int, *, timeout: float | None = None) -> int:
         """Returns an analog input (1 to 20), 0 to 4095. Manual 2.16.5.
+
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            timeout: Seconds.
 
         Raises:
             ValueError: The pin is not configured as an analog input; see `configure_io`.
@@ -431,6 +447,9 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
             on: Whether it is to look; its lamp goes with it.
             version: Which hardware version it is. One that is taken for the other sees nothing.
             timeout: Seconds.
+
+        Raises:
+            ValueError: There is no such port or version.
         """
         PORTAL.run(lambda: self.asynchronous.set_color_sensor(port, on=on, version=version, timeout=timeout))
 
@@ -469,11 +488,22 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
             on: Whether it is to look.
             version: Which hardware version it is. One that is taken for the other sees nothing.
             timeout: Seconds.
+
+        Raises:
+            ValueError: There is no such port or version.
         """
         PORTAL.run(lambda: self.asynchronous.set_infrared_sensor(port, on=on, version=version, timeout=timeout))
 
     def get_infrared(self, port: c.InfraredPort, *, timeout: float | None = None) -> bool:
-        """Returns whether the infrared sensor at a port sees something."""
+        """Returns whether the infrared sensor at a port sees something.
+
+        Args:
+            port: Its socket.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: There is no such port.
+        """
         return PORTAL.run(lambda: self.asynchronous.get_infrared(port, timeout=timeout))
 
     def wait_for_infrared(self, port: c.InfraredPort, *, seen: bool = True, timeout: float | None = None) -> None:

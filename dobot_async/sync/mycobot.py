@@ -336,7 +336,13 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         return PORTAL.run(lambda: self.asynchronous.is_paused(timeout=timeout))
 
     def is_in_position(self, values: Sequence[float], *, coords: bool = False, timeout: float | None = None) -> bool:
-        """Return whether the arm says that it is at these angles, or coordinates. The vendor calls it unstable."""
+        """Return whether the arm says that it is at these angles, or coordinates. The vendor calls it unstable.
+
+        Args:
+            values: Degrees of all joints, or mm and degrees of all axes.
+            coords: Whether they are coordinates.
+            timeout: Seconds.
+        """
         return PORTAL.run(lambda: self.asynchronous.is_in_position(values, coords=coords, timeout=timeout))
 
     def is_powered(self, *, timeout: float | None = None) -> bool:
@@ -362,11 +368,22 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         PORTAL.run(lambda: self.asynchronous.release(joint, damping=damping, timeout=timeout))
 
     def focus(self, joint: int | None = None, *, timeout: float | None = None) -> None:
-        """Let one servo (from 1) hold its place again, or all."""
+        """Let one servo (from 1) hold its place again, or all.
+
+        Args:
+            joint: Which one; None for all.
+            timeout: Seconds.
+        """
         PORTAL.run(lambda: self.asynchronous.focus(joint, timeout=timeout))
 
     def get_pin(self, pin: int, *, base: bool = False, timeout: float | None = None) -> bool:
-        """Return the level of a pin of the Atom, at the tool, or of the M5 in the base."""
+        """Return the level of a pin of the Atom, at the tool, or of the M5 in the base.
+
+        Args:
+            pin: Its number, on the Atom or the M5.
+            base: Whether it is one of the M5.
+            timeout: Seconds.
+        """
         return PORTAL.run(lambda: self.asynchronous.get_pin(pin, base=base, timeout=timeout))
 
     def get_gripper(self, *, kind: c.GripperType | None = None, timeout: float | None = None) -> int:
@@ -394,11 +411,26 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         return PORTAL.run(lambda: self.asynchronous.get_status(timeout=timeout))
 
     def get_joint_limits(self, joint: int, *, timeout: float | None = None) -> tuple[float, float]:
-        """Return the least and the greatest angle that the arm allows a joint (from 1)."""
+        """Return the least and the greatest angle that the arm allows a joint (from 1).
+
+        Args:
+            joint: From 1.
+            timeout: Seconds.
+        """
         return PORTAL.run(lambda: self.asynchronous.get_joint_limits(joint, timeout=timeout))
 
     def set_joint_limits(self, joint: int, low: float, high: float, *, timeout: float | None = None) -> None:
-        """Set the least and the greatest angle that the arm allows a joint (from 1); in tenths of a degree."""
+        """Set the least and the greatest angle that the arm allows a joint (from 1); in tenths of a degree.
+
+        Args:
+            joint: From 1.
+            low: Degrees.
+            high: Degrees.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: An argument is out of range; nothing was sent.
+        """
         PORTAL.run(lambda: self.asynchronous.set_joint_limits(joint, low, high, timeout=timeout))
 
     def get_tool(self, *, timeout: float | None = None) -> c.Coords:
@@ -406,7 +438,15 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         return PORTAL.run(lambda: self.asynchronous.get_tool(timeout=timeout))
 
     def set_tool(self, *coords: float, timeout: float | None = None) -> None:
-        """Say where the tool's end is, seen from the flange; it counts once `set_end_type(EndType.TOOL)` was said."""
+        """Say where the tool's end is, seen from the flange; it counts once `set_end_type(EndType.TOOL)` was said.
+
+        Args:
+            *coords: x, y, z in mm, rx, ry, rz in degrees.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: An argument is out of range; nothing was sent.
+        """
         PORTAL.run(lambda: self.asynchronous.set_tool(*coords, timeout=timeout))
 
     def get_world(self, *, timeout: float | None = None) -> c.Coords:
@@ -414,7 +454,15 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         return PORTAL.run(lambda: self.asynchronous.get_world(timeout=timeout))
 
     def set_world(self, *coords: float, timeout: float | None = None) -> None:
-        """Say where the arm's base is in the world; it counts once the reference frame is WORLD."""
+        """Say where the arm's base is in the world; it counts once the reference frame is WORLD.
+
+        Args:
+            *coords: x, y, z in mm, rx, ry, rz in degrees.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: An argument is out of range; nothing was sent.
+        """
         PORTAL.run(lambda: self.asynchronous.set_world(*coords, timeout=timeout))
 
     def set_reference_frame(self, frame: c.ReferenceFrame, *, timeout: float | None = None) -> None:

@@ -23,7 +23,7 @@ from dobot_async.sync.signals import Signals
 __all__ = ["PORTAL", "Leavable", "Portal", "run"]
 
 R = TypeVar("R")
-logger = logging.getLogger("dobot_async.sync")
+logger: logging.Logger = logging.getLogger("dobot_async.sync")
 LEAVING = 4.0  # seconds that the thread has to end at the end of the interpreter
 
 

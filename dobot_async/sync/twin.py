@@ -31,7 +31,7 @@ class Twin(Generic[A]):
     __slots__ = ("asynchronous",)
 
     def __init__(self, asynchronous: A) -> None:
-        self.asynchronous = asynchronous
+        self.asynchronous: A = asynchronous
 
     def __eq__(self, other: object) -> bool:
         return self.asynchronous is getattr(other, "asynchronous", other)

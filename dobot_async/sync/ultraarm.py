@@ -41,7 +41,7 @@ class UltraArmBatch(BatchTwin[AsyncUltraArmBatch], Verbs[Motion]):
 
     def __init__(self, asynchronous: AsyncUltraArmBatch) -> None:
         super().__init__(asynchronous)
-        self.pump = asynchronous.pump
+        self.pump: Pump = asynchronous.pump
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
         """Add any row of the table that may be queued."""
@@ -53,7 +53,7 @@ class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
 
     def __init__(self, asynchronous: AsyncUltraArmQueue) -> None:
         super().__init__(asynchronous)
-        self.pump = asynchronous.pump
+        self.pump: Pump = asynchronous.pump
 
     def batch(self, *, timeout: float | None = None) -> AbstractContextManager[UltraArmBatch]:
         """Collect commands, and queue them with nothing between them when the block ends; an error sends none.
@@ -141,7 +141,7 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
 
     def __init__(self, asynchronous: AsyncUltraArm) -> None:
         super().__init__(asynchronous)
-        self.pump = asynchronous.pump
+        self.pump: Pump = asynchronous.pump
 
     @property
     def link(self) -> Link:

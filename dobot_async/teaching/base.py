@@ -7,7 +7,7 @@ taught     an arm: where it is, how it goes to a step, how it is jogged and led
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import AsyncGenerator, Collection, Sequence
+from collections.abc import AsyncGenerator, Callable, Collection, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any
 
@@ -126,7 +126,7 @@ class TaughtArm(ABC):
 
     def __init__(self, arm: Any) -> None:
         self.arm = arm
-        self.check_stop = stop_check(arm)
+        self.check_stop: Callable[[], None] = stop_check(arm)
 
     @property
     def model(self) -> str:

@@ -26,7 +26,7 @@ __all__ = ["from_json", "load_recording", "save_recording", "to_json"]
 
 FORMAT, VERSION = "dobot_async recording", 1
 PLAYBACK = ".playback"
-LISTS = {"steps": TaughtStep, "path": PathSample}
+LISTS: Mapping[str, type[TaughtStep | PathSample]] = {"steps": TaughtStep, "path": PathSample}
 
 
 def to_json(recording: Recording) -> str:

@@ -34,7 +34,7 @@ from dobot_async.teaching.recording import Gripper, Mode, Recording, TaughtStep,
 
 __all__ = ["read_playback", "write_playback"]
 
-logger = logging.getLogger("dobot_async.teaching")
+logger: logging.Logger = logging.getLogger("dobot_async.teaching")
 
 HEADS = ("DobotType", "StudioVersion")
 STYLES: tuple[Mode, ...] = ("jump", "point", "line", "arc")
@@ -167,7 +167,7 @@ def step_of(element: Element, reader: PlaybackReader) -> TaughtStep:
             reader.remark(what, element.line)
 
     row = Row(element, reader.file)
-    mode = row.choice(0, STYLES)
+    mode: Mode | None = row.choice(0, STYLES)
     if mode is None:
         raise row.wrong(0, "is missing")
 

@@ -35,4 +35,4 @@ class RecordingUnfit(ValueError):
     def __init__(self, problems: Sequence[str]) -> None:
         more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
         super().__init__("; ".join(problems[:SHOWN]) + more)
-        self.problems = tuple(problems)
+        self.problems: tuple[str, ...] = tuple(problems)

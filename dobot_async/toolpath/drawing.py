@@ -93,7 +93,7 @@ class Drawing:
 
         self._arm = arm
         self._plane = plane
-        self._tool = tool
+        self._tool: Tool = tool
         self._reach = reach_of(arm)
         self._pace = DrawingPace(above_zero(acceleration, "acceleration"), whole_percent(percent))
         path = simplified(toolpath, tolerance)

@@ -19,7 +19,7 @@ from dobot_async.toolpath.toolpath import Toolpath
 
 __all__ = ["read_dxf"]
 
-logger = logging.getLogger("dobot_async.toolpath")
+logger: logging.Logger = logging.getLogger("dobot_async.toolpath")
 LAYOUT_ONLY = frozenset({"VIEWPORT", "ATTDEF"})
 FEWEST = 4  # ways of an arc, however small
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 __all__ = ["Progress", "ProgressMeter"]
 
-logger = logging.getLogger("dobot_async.toolpath")
+logger: logging.Logger = logging.getLogger("dobot_async.toolpath")
 LEAST_KNOWN = 0.05  # of the time that was guessed, before how long it really takes is believed
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
-from typing import Any, SupportsFloat
+from typing import Any, SupportsFloat, SupportsIndex
 
 from dobot_async._core.util.arguments import check_duration, to_float
 from dobot_async.toolpath.moves import MoveKind, Tool, ToolpathMove, fastest, moves_of
@@ -97,13 +97,14 @@ def whole_percent(value: Any) -> int:
 
 
 def position_in(
-    strokes: Sequence[Sequence[ToolpathMove]], stroke: Any, point: SupportsFloat, tool: Tool
+    strokes: Sequence[Sequence[ToolpathMove]], stroke: SupportsIndex, point: SupportsFloat, tool: Tool
 ) -> StrokePosition:
     """The place where to begin, checked."""
     if not hasattr(stroke, "__index__"):
         raise TypeError(f"first must be the number of a stroke, not {stroke!r}")
 
-    if not 0 <= stroke < len(strokes):
+    number = stroke.__index__()
+    if not 0 <= number < len(strokes):
         raise ValueError(
             f"first must be in 0 to {len(strokes) - 1}, for there are {len(strokes)} strokes, not {stroke!r}"
         )
@@ -112,8 +113,8 @@ def position_in(
     if found and tool != "laser":
         raise ValueError("point is for lasers alone: a pen draws a stroke from its start")
 
-    last = len(strokes[stroke]) - 1
+    last = len(strokes[number]) - 1
     if not 0 <= found <= last or (found == last and found):
         raise ValueError(f"point must be 0 or above and below {last}, the last point of stroke {stroke}, not {point!r}")
 
-    return StrokePosition(stroke.__index__(), found)
+    return StrokePosition(number, found)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from dobot_async.toolpath import curves
@@ -42,19 +43,20 @@ def read_svg(source: Source, *, tolerance: float = FINE) -> Toolpath:
     with library():
         import svgelements
 
+    elements: Any = svgelements  # it has no types
     check_tolerance(tolerance)
     name = name_of(source)
     try:
         text, height = plain(parse_tree(content(source)))
-        found = svgelements.SVG.parse(io.StringIO(text), reify=False, ppi=96)
-        strokes = []
+        found = elements.SVG.parse(io.StringIO(text), reify=False, ppi=96)
+        strokes: list[Stroke] = []
         for shape in found.elements():
-            if isinstance(shape, svgelements.Shape) and is_painted(shape):
+            if isinstance(shape, elements.Shape) and is_painted(shape):
                 layer = shape.values.get("data-layer", "")
                 try:
                     strokes += [
                         Stroke(tuple((p.real * MM, (height - p.imag) * MM) for p in points), layer=layer)
-                        for points in outlines(shape, svgelements, tolerance / MM)
+                        for points in outlines(shape, elements, tolerance / MM)
                     ]
                 except (ValueError, ZeroDivisionError, OverflowError) as error:
                     raise SVGProblem(int(shape.values.get("data-line", 0)), str(error)) from error
@@ -113,7 +115,7 @@ def way(segment: Any, svgelements: Any, tolerance: float) -> list[complex]:
     return curves.bezier(tolerance, *points) if len(points) > 2 else points[1:]
 
 
-CONTROLS = {
+CONTROLS: Mapping[str, tuple[str, ...]] = {
     "CubicBezier": ("start", "control1", "control2", "end"),
     "QuadraticBezier": ("start", "control", "end"),
 }

@@ -20,7 +20,7 @@ from dobot_async.toolpath.svg_checks import SHAPES, Node, SVGProblem, check, len
 
 __all__ = ["parse_tree", "plain"]
 
-logger = logging.getLogger("dobot_async.toolpath")
+logger: logging.Logger = logging.getLogger("dobot_async.toolpath")
 SVG = "http://www.w3.org/2000/svg"
 NOT_DRAWN = {"text": "convert it to paths", "image": "read it as a picture", "foreignObject": "convert it to paths"}
 GROUPS = frozenset({"svg", "g", "a", "switch", "use", "symbol"})
@@ -101,7 +101,7 @@ class SVGWriter:
         self._page = Viewport(
             *(side(root, name, default) for name, default in (("width", of_box.width), ("height", of_box.height)))
         )
-        self.height = self._page.height
+        self.height: float = self._page.height
 
     def write(self) -> str:
         """Return the text."""

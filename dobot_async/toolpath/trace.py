@@ -63,7 +63,8 @@ def trace_picture(
     picture.thumbnail((MOST, MOST))
     white = np.asarray(picture) > 255 * (1 - limit)
     scale = size[0] / picture.width, size[1] / picture.height
-    traced = potrace.Bitmap(white).trace(turdsize=speckle, alphamax=corners)
+    tracer: Any = potrace  # it has no types
+    traced = tracer.Bitmap(white).trace(turdsize=speckle, alphamax=corners)
     lines = (outline(curve, tolerance / max(scale)) for curve in traced)
     return Toolpath(
         tuple(Stroke(tuple((p.real * scale[0], (picture.height - p.imag) * scale[1]) for p in line)) for line in lines)

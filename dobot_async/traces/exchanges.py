@@ -108,10 +108,10 @@ class Exchanges:
 
     def __init__(self, trace: Trace) -> None:
         first = trace.lines[0]
-        self.opening = RecordedRequest(-1, -1, first.t)
+        self.opening: RecordedRequest = RecordedRequest(-1, -1, first.t)
         self.asked: list[RecordedRequest] = []
         self.came: list[float] = []
-        self.end = trace.lines[-1].t
+        self.end: float = trace.lines[-1].t
         self._now = first.t
         self._last = self.opening
         self._answered: list[RecordedRequest] = []

@@ -26,7 +26,7 @@ __all__ = ["VERSION", "NamedTrace", "TraceFile", "part_path"]
 
 VERSION = 1
 LEAST = 4096
-logger = logging.getLogger("dobot_async.trace")
+logger: logging.Logger = logging.getLogger("dobot_async.trace")
 
 
 class TraceFile:

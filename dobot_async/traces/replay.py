@@ -39,7 +39,7 @@ Retime = Callable[[bytes, float], bytes]
 RETIMES: Parts[Retime] = Parts("replay")
 sessions: WeakValueDictionary[str, Replay] = WeakValueDictionary()
 """Replays that may be opened again, as the connection was that they are of."""
-names = itertools.count(1)
+names: itertools.count[int] = itertools.count(1)
 
 
 async def open_url(url: SplitResult, *, arm: str) -> ReplayTransport:
@@ -133,10 +133,10 @@ class Replay:
         self.script = script
         self.url = url
         self.retime = retime
-        self.open_from = -math.inf
+        self.open_from: float = -math.inf
         self.number = 0  # of the last piece that was delivered
         now = asyncio.get_running_loop().time()
-        self.began = now - script.opening.t
+        self.began: float = now - script.opening.t
         script.begin(now)
 
     def reopened(self) -> ReplayTransport:
@@ -162,10 +162,10 @@ class ReplayTransport:
 
     def __init__(self, replay: Replay) -> None:
         connection = replay.connection
-        self.url = replay.url
-        self.in_flight = int(connection.number("in_flight", 1))
-        self.window = int(connection.number("window", 1))
-        self.reorder_window = connection.number("reorder_window")
+        self.url: str = replay.url
+        self.in_flight: int = int(connection.number("in_flight", 1))
+        self.window: int = int(connection.number("window", 1))
+        self.reorder_window: float = connection.number("reorder_window")
         self._replay = replay
         self._loop = asyncio.get_running_loop()
         self._due: list[Due] = []

@@ -41,7 +41,7 @@ class Script:
 
     def __init__(self, trace: Trace) -> None:
         recorded = Exchanges(trace)
-        self.opening = recorded.opening
+        self.opening: RecordedRequest = recorded.opening
         self._asked, self._came, self._end = recorded.asked, recorded.came, recorded.end
         self._known: dict[bytes, list[RecordedRequest]] = {}
         self._secret = [each for each in self._asked if each.secret]

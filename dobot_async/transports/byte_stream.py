@@ -29,7 +29,7 @@ class ByteStreamTransport(InputBuffer, asyncio.Protocol):
 
     in_flight = MANY
     window = WINDOW
-    reorder_window = 0.0
+    reorder_window: float = 0.0
 
     def __init__(self) -> None:
         super().__init__()

@@ -7,11 +7,13 @@ like any other, one request is under way at a time, and a lost one is silence.
 from __future__ import annotations
 
 import ssl
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult
 
 import anyio
+from anyio.abc import ConnectedUDPSocket
 
 from dobot_async._core.protocol.transport import Transport
 from dobot_async.errors import ConnectFailed
@@ -133,11 +135,11 @@ def trust(ca: str | None) -> ssl.SSLContext:
 class TokenDatagrams:
     """Datagrams with a token in each: any of them may be the first that arrives."""
 
-    def __init__(self, datagrams: Any, greeting: bytes) -> None:
+    def __init__(self, datagrams: ConnectedUDPSocket, greeting: bytes) -> None:
         self._datagrams = datagrams
         self._greeting = greeting
-        self.receive = datagrams.receive
-        self.aclose = datagrams.aclose
+        self.receive: Callable[[], Coroutine[Any, Any, bytes]] = datagrams.receive
+        self.aclose: Callable[[], Coroutine[Any, Any, None]] = datagrams.aclose
 
     async def send(self, data: bytes) -> None:
         """Send one datagram."""

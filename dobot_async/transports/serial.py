@@ -11,14 +11,16 @@ import asyncio
 import os
 import threading
 from collections.abc import Callable
+from typing import Any
 
 import serial
-from serial_asyncio import connection_for_serial
+import serial_asyncio
 
 from dobot_async.transports.port import PortTransport
 
 __all__ = ["SerialTransport", "open_port"]
 
+SERIAL_ASYNCIO: Any = serial_asyncio  # it has no types
 POSIX = os.name == "posix"
 
 
@@ -29,14 +31,17 @@ async def open_port(path: str, baud: int) -> SerialTransport:
     port.dtr = port.rts = False
     try:
         await in_thread(port.open, port.close)
-        output, transport = await connection_for_serial(asyncio.get_running_loop(), SerialTransport, port)
+        opened: tuple[asyncio.Transport, SerialTransport] = await SERIAL_ASYNCIO.connection_for_serial(
+            asyncio.get_running_loop(), SerialTransport, port
+        )
     except (OSError, ValueError):
         port.close()
         raise
 
     # Said here already, for waiting until it is said could be cancelled, and would leave an open port to nobody.
+    output, transport = opened
     transport.connection_made(output)
-    return transport  # type: ignore[no-any-return]
+    return transport
 
 
 class Port(serial.Serial):

@@ -19,7 +19,7 @@ __all__ = ["SerialxTransport", "open_port"]
 
 PATIENCE = 1.0
 """Seconds that a cancelled opening waits until the system has let go of the port."""
-logger = logging.getLogger("serialx")
+logger: logging.Logger = logging.getLogger("serialx")
 if logger.level == logging.NOTSET:
     logger.setLevel(logging.INFO)
 

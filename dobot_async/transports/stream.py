@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
+from types import CoroutineType
 from typing import Any
 
 __all__ = ["StreamTransport"]
@@ -15,9 +16,9 @@ class StreamTransport:
         self.in_flight = in_flight
         self.window = window
         self._reorder_window = reorder_window
-        self.send: Callable[[bytes], Coroutine[Any, Any, None]] = stream.send
-        self.receive: Callable[[], Coroutine[Any, Any, bytes]] = stream.receive
-        self.aclose: Callable[[], Coroutine[Any, Any, None]] = stream.aclose
+        self.send: Callable[[bytes], CoroutineType[Any, Any, None]] = stream.send
+        self.receive: Callable[[], CoroutineType[Any, Any, bytes]] = stream.receive
+        self.aclose: Callable[[], CoroutineType[Any, Any, None]] = stream.aclose
 
     @property
     def reorder_window(self) -> float:

@@ -82,7 +82,7 @@ class WebSocketTransport:
 
     in_flight = MANY
     window = WINDOW
-    reorder_window = 0.0
+    reorder_window: float = 0.0
 
     def __init__(self, socket: Any, closed: type[Exception]) -> None:
         self._socket = socket

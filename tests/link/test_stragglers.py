@@ -10,7 +10,7 @@ import pytest
 from link_line import LATENCY, LOST, TIME, Line, asked, line, now
 
 from dobot_async._core.link.link import Link
-from dobot_async._core.link.stragglers import AMONG, RARE, SUSPICION, Stragglers
+from dobot_async._core.link.stragglers import AMONG, PROVEN, RARE, SUSPICION, Stragglers
 from dobot_async.arms.magician.frame import Frame
 from dobot_async.errors import ReplyTimeout
 
@@ -62,10 +62,20 @@ def test_a_loss_whose_reply_comes_after_all_was_none(stragglers: Stragglers) -> 
 
     assert stragglers.suspected("pose", 19.9)
     stragglers.came("alarms", 19.9)
+    later = 19.5 + PROVEN
     for _ in range(RARE):
-        stragglers.lost("pose", 20.0)
+        stragglers.lost("pose", later)
 
-    assert not stragglers.suspected("pose", 20.0)
+    assert not stragglers.suspected("pose", later)
+
+
+def test_where_a_reply_came_alone_losses_are_suspected_however_many(stragglers: Stragglers) -> None:
+    stragglers.lost("alarms", 10.0)
+    stragglers.came("alarms", 10.5)
+    for _ in range(RARE):
+        stragglers.lost("pose", 11.0)
+
+    assert stragglers.suspected("pose", 11.0)
 
 
 def test_what_had_several_replies_is_suspected_and_no_loss_of_the_line(stragglers: Stragglers) -> None:

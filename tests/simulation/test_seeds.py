@@ -27,6 +27,7 @@ HARD = {
     801433: "an arm that was switched off and on once, and not again",
     6023359: "a stop whose first copy was thought to be lost, and is acknowledged twice",
     8001935: "stops that a line of datagrams holds up, one after the other: each acknowledgement is an older one's",
+    9049553: "several answers in a row that come alone, on a line that is known to do that",
     153: "a question that waits for its turn, and then for its answer",
 }
 """What once broke a promise, each found in the scenario as it is now."""

@@ -295,7 +295,10 @@ class Writer:
         if twin.copies:
             lines += ["", f"    def __init__(self, asynchronous: {original}) -> None:"]
             lines += ["        super().__init__(asynchronous)"]
-            lines += [f"        self.{name} = asynchronous.{name}" for name in twin.copies]
+            for name in twin.copies:
+                holder = next(each for each in kind.__mro__ if name in inspect.get_annotations(each))
+                of = self.need(holder.__module__, inspect.get_annotations(holder)[name])
+                lines += [f"        self.{name}: {of} = asynchronous.{name}"]
 
         for name, of in (twin.members | twin.reads).items():
             value = of

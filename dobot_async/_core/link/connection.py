@@ -48,9 +48,9 @@ class Connection(ABC):
     """
 
     def __init__(self, transport: Transport, url: str, reopen: Reopen | None) -> None:
-        self.url = hidden(url)
-        self.state = Watched(LinkState.OPEN)
-        self.outages = 0
+        self.url: str = hidden(url)
+        self.state: Watched[LinkState] = Watched(LinkState.OPEN)
+        self.outages: int = 0
         self._transport = transport
         self._write = nowait_writer(transport)
         self._reopen = reopen

@@ -56,7 +56,7 @@ class Exchange(Connection, Generic[F]):
         self._correlator: Correlator[F] = Correlator(
             self._loop.time, lambda: self._transport.reorder_window, self._lost_on_the_way
         )
-        self.heard_at = -math.inf
+        self.heard_at: float = -math.inf
         self._stragglers = Stragglers()
         self._round_trip = round_trip
         self._stats = LinkStats()

@@ -85,7 +85,7 @@ class Link(Exchange[F]):
         self.on_data: Hooks[[bytes]] = Hooks()
         self.on_unsolicited: Hooks[[F]] = Hooks()
         self.on_lost: Hooks[[ConnectionLost]] = Hooks()
-        self.cleanup = Cleanup(self.url)
+        self.cleanup: Cleanup = Cleanup(self.url)
         self._parser = parser
         self._encode = encode
         self._read_only = read_only

@@ -6,7 +6,8 @@ seconds after a loss a barrier is asked behind each request of that key: with on
 answer it is the right one (`Correlator`, held requests).
 
 That costs a second request each time, so it is done only where losses are rare: on a line that loses many messages a
-reply that does not come is lost. A loss whose reply comes after all was none.
+reply that does not come is lost. A loss whose reply comes after all was none, and for `PROVEN` seconds it shows that
+losses tell nothing here.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Hashable
 __all__ = ["Stragglers"]
 
 SUSPICION = 3.0
+PROVEN = 60.0
 RARE = 3  # losses ...
 AMONG = 80  # ... among so many messages are no longer rare
 
@@ -29,6 +31,7 @@ class Stragglers:
         self._sent = 0
         self._losses: deque[int] = deque(maxlen=RARE)
         self._until: dict[Hashable, float] = {}
+        self._proven_until = -math.inf
 
     def sent(self) -> None:
         """Note that something was sent."""
@@ -51,12 +54,15 @@ class Stragglers:
 
     def came(self, key: Hashable, now: float) -> None:
         """Note that a reply of a key came that nobody waits for: what was lost was not its request."""
-        if self._losses and now < self._until.get(key, -math.inf):
-            self._losses.pop()
+        if now < self._until.get(key, -math.inf):
+            self._proven_until = now + PROVEN
+            if self._losses:
+                self._losses.pop()
 
     def suspected(self, key: Hashable, now: float) -> bool:
         """Return whether the reply to a request of a key has to be told from one that is late alone."""
         if now >= self._until.get(key, -math.inf):
             return False
 
-        return len(self._losses) < RARE or self._sent - self._losses[0] > AMONG
+        rare = len(self._losses) < RARE or self._sent - self._losses[0] > AMONG
+        return rare or now < self._proven_until

@@ -29,7 +29,7 @@ class Transport(Protocol):
         """See above; it may change with the link."""
         ...
 
-    async def send(self, data: bytes) -> None:
+    async def send(self, data: bytes, /) -> None:
         """Send all bytes of one frame; wait while the line cannot take them.
 
         A send that is cancelled returns at once, and has sent the whole frame or nothing of it.

@@ -185,8 +185,8 @@ class Number(Generic[T]):
     """A bare number (or flag, or enum, or row of numbers): `Number(u32)`."""
 
     def __init__(self, annotation: Any, order: str = "<") -> None:
-        self.field = Field.of("value", annotation)
-        self.struct = struct.Struct(f"{order}{self.field.scalar.count}{self.field.scalar.code}")
+        self.field: Field = Field.of("value", annotation)
+        self.struct: struct.Struct = struct.Struct(f"{order}{self.field.scalar.count}{self.field.scalar.code}")
 
     def encode(self, value: T) -> bytes:
         """Packs one number."""
@@ -206,15 +206,15 @@ class Record(Generic[T]):
         self.kind = kind
         hints = get_type_hints(kind, include_extras=True)
         names = [each.name for each in fields(kind)]
-        self.tail = layout_of(hints[names[-1]])
-        self.tail_name = names.pop() if self.tail else ""
+        self.tail: Layout[Any] | None = layout_of(hints[names[-1]])
+        self.tail_name: str = names.pop() if self.tail else ""
         self.fields: dict[str, Field | Record[Any]] = {
             name: Record(hints[name], order) if is_dataclass(hints[name]) else Field.of(name, hints[name])
             for name in names
         }
         self.codes: str = "".join(field.codes for field in self.fields.values())
-        self.struct = struct.Struct(order + self.codes)
-        self.plain = all(isinstance(field, Field) and field.plain for field in self.fields.values())
+        self.struct: struct.Struct = struct.Struct(order + self.codes)
+        self.plain: bool = all(isinstance(field, Field) and field.plain for field in self.fields.values())
 
     def encode(self, value: T) -> bytes:
         """Packs a record."""

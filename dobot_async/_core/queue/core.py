@@ -47,7 +47,7 @@ class QueueCore:
     """
 
     def __init__(self, executor: Executor) -> None:
-        self.epoch = Epoch()
+        self.epoch: Epoch = Epoch()
         self.outcomes: Counter[str] = Counter()
         self._executor = executor
         executor.on_unknown.add(self.give_up)

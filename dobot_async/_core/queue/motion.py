@@ -50,12 +50,12 @@ class Motion:
 
     def __init__(self, queue: Watcher, entry: Entry) -> None:
         self.entry = entry
-        self.name = entry.command.name
-        self.moves = entry.command.moves
+        self.name: str = entry.command.name
+        self.moves: bool = entry.command.moves
         self.index: int | None = None
         self.call: object = None
         self.withdrawn = False
-        self.accepted_or_ended = asyncio.Event()
+        self.accepted_or_ended: asyncio.Event = asyncio.Event()
         self._queue = queue
         self._ended = asyncio.Event()
         self._error: DobotError | None = None

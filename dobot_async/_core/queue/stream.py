@@ -15,7 +15,7 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterable, AsyncIterator, Coroutine, Generator, Iterable
 from contextlib import AbstractContextManager, suppress
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeGuard, TypeVar
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.epoch import Epoch
@@ -124,6 +124,11 @@ class Stream(Generic[Y]):
         return None
 
 
+def is_coroutine(step: object) -> TypeGuard[Coroutine[Any, Any, object]]:
+    """Return whether a step is a verb of the queue, to be awaited."""
+    return isinstance(step, Coroutine)
+
+
 class Feeder:
     """What puts the steps of a stream.
 
@@ -148,12 +153,15 @@ class Feeder:
         try:
             async for step in drawn(self._steps):
                 number += 1
-                is_verb = isinstance(step, Coroutine)
+                is_verb = is_coroutine(step)
                 self._putting = (name_of(step, number), step)
                 await self._acquire(step)
-                motion: object = await (
-                    step if is_verb else self._queue.put(step.command, step.value, epoch=self._epoch)
-                )
+                motion: object
+                if is_verb:
+                    motion = await step
+                else:
+                    motion = await self._queue.put(step.command, step.value, epoch=self._epoch)
+
                 if not isinstance(motion, Motion):
                     raise TypeError("a step is a verb of the queue, such as arm.queue.home(), or has command and value")
 

@@ -53,7 +53,7 @@ class Listener(Generic[T]):
     """
 
     def __init__(self, *, closed: bool) -> None:
-        self.missed = 0
+        self.missed: int = 0
         self._closed = closed
         self._backlog: deque[T] = deque()
         self._news = asyncio.Event()
@@ -94,7 +94,7 @@ class Watched(Generic[T]):
     """
 
     def __init__(self, value: T) -> None:
-        self.value = value
+        self.value: T = value
         self._changes: Events[T] = Events()
 
     def change(self, value: T) -> None:

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, TypeGuard
 
-__all__ = ["plain"]
+__all__ = ["is_row", "is_table", "plain"]
+
+
+def is_table(value: object) -> TypeGuard[dict[Any, Any]]:
+    """Return whether a value is a dict, of whatever; a type checker knows nothing of what is in one otherwise."""
+    return isinstance(value, dict)
+
+
+def is_row(value: object) -> TypeGuard[Sequence[Any]]:
+    """Return whether a value is a list or a tuple, of whatever."""
+    return isinstance(value, (list, tuple))
 
 
 def plain(value: Any) -> Any:
@@ -15,10 +26,10 @@ def plain(value: Any) -> Any:
     if is_dataclass(value):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
 
-    if isinstance(value, dict):
+    if is_table(value):
         return {key: plain(each) for key, each in value.items()}
 
-    if isinstance(value, (list, tuple)):
+    if is_row(value):
         return [plain(each) for each in value]
 
     if isinstance(value, Enum):

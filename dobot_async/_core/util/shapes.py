@@ -39,7 +39,14 @@ class Box:
             check_span(name, getattr(self, name))
 
     def contains(self, x: float, y: float, z: float, margin: float = 0.0) -> bool:
-        """Returns whether a place is inside, or outside by at most `margin` mm along an axis."""
+        """Returns whether a place is inside, or outside by at most `margin` mm along an axis.
+
+        Args:
+            x: mm.
+            y: mm.
+            z: mm.
+            margin: mm, 0 or more.
+        """
         return all(
             low - margin <= value <= high + margin for value, (low, high) in ((x, self.x), (y, self.y), (z, self.z))
         )
@@ -96,7 +103,14 @@ class Cylinder:
         check_span("z", self.z)
 
     def contains(self, x: float, y: float, z: float, margin: float = 0.0) -> bool:
-        """Returns whether a place is inside, or outside by at most `margin` mm."""
+        """Returns whether a place is inside, or outside by at most `margin` mm.
+
+        Args:
+            x: mm.
+            y: mm.
+            z: mm.
+            margin: mm, 0 or more.
+        """
         low, high = self.z
         return math.hypot(x - self.x, y - self.y) <= self.radius + margin and low - margin <= z <= high + margin
 

@@ -70,15 +70,15 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
         workspace: Workspace | None = None,
     ) -> None:
         self.link = link
-        self.wifi = WiFi(link)
+        self.wifi: WiFi = WiFi(link)
         self._check_reach = check_reach
         self._fresh = fresh
         self._executor = MagicianExecutor(link, window, self._check)
         if workspace:
             self._executor.keeper = MagicianKeeper(workspace, self._stand, self._executor.status.ask)
 
-        self.queue = MagicianQueue(self._executor)
-        self.following = MagicianFollowing(link, self._executor, lambda: self.queue)
+        self.queue: MagicianQueue = MagicianQueue(self._executor)
+        self.following: MagicianFollowing = MagicianFollowing(link, self._executor, lambda: self.queue)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
 
     @classmethod

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from dobot_async._core.protocol.contract import Parser
 from dobot_async._core.protocol.transport import Transport
@@ -45,7 +45,7 @@ class MagicianWatch:
     """
 
     def __init__(self) -> None:
-        self.question = f.request(c.GET_QUEUED_CMD_CURRENT_INDEX, b"", queued=False)
+        self.question: Frame = f.request(c.GET_QUEUED_CMD_CURRENT_INDEX, b"", queued=False)
         self._last: int | None = None
         self._unacknowledged = False
         self._goes_on = False
@@ -162,18 +162,18 @@ class BridgedMagician(ByKey[Frame]):
 
     model = "magician"
     header = f.HEADER
-    filler = f.FILLER
-    encode = staticmethod(f.request)
+    filler: bytes = f.FILLER
+    encode: Final = staticmethod(f.request)
     proves_stop = True
-    greeting = f.request(c.GET_END_EFFECTOR_PARAMS, b"", queued=False)
-    barriers = tuple(f.request(row, b"", queued=False) for row in BARRIERS)
-    stopping = tuple(f.request(row, row.request.encode(value), queued=False) for row, value in LEAVING)
-    readings = {  # noqa: RUF012 - a table
+    greeting: Frame = f.request(c.GET_END_EFFECTOR_PARAMS, b"", queued=False)
+    barriers: tuple[Frame, ...] = tuple(f.request(row, b"", queued=False) for row in BARRIERS)
+    stopping: Sequence[Frame] = tuple(f.request(row, row.request.encode(value), queued=False) for row, value in LEAVING)
+    readings: dict[str, TelemetryRead[Frame]] = {  # noqa: RUF012 - a table
         "pose": TelemetryRead(f.request(c.GET_POSE, b"", queued=False), 0.2, told_pose),
         "motion": TelemetryRead(MagicianWatch().question, 0.2, told_index),
         "alarms": TelemetryRead(f.request(c.GET_ALARMS_STATE, b"", queued=False), 1.0, told_alarms),
     }
-    deny_groups = {  # noqa: RUF012 - a table
+    deny_groups: dict[str, frozenset[int]] = {  # noqa: RUF012 - a table
         "wifi": frozenset(range(150, 158)),
         "calibration": frozenset(
             {c.RESET_POSE.id, c.SET_AUTO_LEVELING_CMD.id, *range(140, 144), 222, 223, 224, 230, 231}

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 from dobot_async._core.protocol.layouts import NOTHING, Bytes, Count, Lenient, Text
 from dobot_async._core.protocol.rows import Rows
@@ -56,7 +56,10 @@ FLASH = 3.0  # seconds that an arm may take to answer a command that it keeps be
 
 
 ROWS = Rows(Record, NOTHING)
-read, ask, write, motion = ROWS.read, ROWS.ask, ROWS.write, ROWS.motion
+read: Final = ROWS.read
+ask: Final = ROWS.ask
+write: Final = ROWS.write
+motion: Final = ROWS.motion
 
 
 def queued(name: str, number: int, request: type[Q] | Layout[Q], section: str) -> Command[Q, None]:

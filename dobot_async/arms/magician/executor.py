@@ -96,7 +96,7 @@ class MagicianExecutor(Submission):
         await self._control(c.SET_QUEUED_CMD_START_EXEC)
         if self.ledger.unacked:
             # Whether the arm took them before it was cleared no longer matters, but the ledger has to be opened anew.
-            self.ledger = QueueLedger()
+            self.ledger: QueueLedger = QueueLedger()
 
         self.space.was_cleared(self.ledger.last)
         self._relative = None

@@ -76,12 +76,12 @@ class MagicianFollowing:
 class MagicianStrategy:
     """See `Strategy`."""
 
-    axes = ("x", "y", "z", "r")
+    axes: tuple[Literal["x"], Literal["y"], Literal["z"], Literal["r"]] = ("x", "y", "z", "r")
     joints = 4
     turns = False
     replaces = True
-    tolerance = (0.5, 0.5)
-    check_every = 0.25
+    tolerance: tuple[float, float] = (0.5, 0.5)
+    check_every: float = 0.25
 
     def __init__(self, link: Link[Frame], executor: MagicianExecutor, queue: MagicianQueue, way: Way) -> None:
         self._link = link

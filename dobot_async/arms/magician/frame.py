@@ -79,8 +79,8 @@ class Parser:
     """
 
     def __init__(self) -> None:
-        self.junk_bytes = 0
-        self.bad_frames = 0
+        self.junk_bytes: int = 0
+        self.bad_frames: int = 0
         self._buffer = b""
         self._whole = 0  # how long the buffer has to be for the candidate at its beginning to be whole
 

@@ -23,9 +23,9 @@ class QueueSpace:
     """
 
     def __init__(self, status: ArmStatus) -> None:
-        self.room = 0
-        self.left = 0
-        self.empty = False
+        self.room: int = 0
+        self.left: int = 0
+        self.empty: bool = False
         self._status = status
         self._capacity: int | None = None
         self._cleared = -1

@@ -85,7 +85,12 @@ class JointLimits:
     fold: tuple[float, float] = (-70.0, 55.0)
 
     def span(self, number: int, joints: tuple[float, ...]) -> tuple[float, float]:
-        """Returns how low and how high joint `number` (1 to 4) may stand while the others stand as they do."""
+        """Returns how low and how high joint `number` (1 to 4) may stand while the others stand as they do.
+
+        Args:
+            number: 1 to 4.
+            joints: The angles of all four, degrees.
+        """
         low, high = (self.j1, self.j2, self.j3, self.j4)[number - 1]
         if number == 2:
             return max(low, joints[2] + self.fold[0]), min(high, joints[2] + self.fold[1])
@@ -96,7 +101,11 @@ class JointLimits:
         return low, high
 
     def problems(self, joints: tuple[float, ...]) -> list[str]:
-        """Returns what is wrong with these joints, a phrase for each; empty if nothing is."""
+        """Returns what is wrong with these joints, a phrase for each; empty if nothing is.
+
+        Args:
+            joints: The angles of all four, degrees.
+        """
         found: list[str] = []
         for number, angle in enumerate(joints, start=1):
             low, high = (self.j1, self.j2, self.j3, self.j4)[number - 1]
@@ -129,7 +138,14 @@ class Kinematics:
     limits: JointLimits = JointLimits()
 
     def forward(self, j1: float, j2: float, j3: float, j4: float) -> Point:
-        """Returns where the tool is; any angles will do."""
+        """Returns where the tool is; any angles will do.
+
+        Args:
+            j1: Degrees, the base.
+            j2: Degrees, the rear arm.
+            j3: Degrees, the forearm.
+            j4: Degrees, the tool.
+        """
         a1, a2, a3 = math.radians(j1), math.radians(j2), math.radians(j3)
         out = REAR_ARM * math.sin(a2) + FOREARM * math.cos(a3) + self.x_bias
         up = REAR_ARM * math.cos(a2) - FOREARM * math.sin(a3) - self.z_bias
@@ -139,7 +155,14 @@ class Kinematics:
     def inverse(self, x: float, y: float, z: float, r: float) -> Joints:
         """Returns the joints that bring the tool there, whatever their limits.
 
+        Args:
+            x: mm, forward.
+            y: mm, to the left.
+            z: mm, up.
+            r: Degrees, the tool's rotation.
+
         Raises:
+            ValueError: A number is not finite.
             Unreachable: No joints do; `alarm` is 0x10 (on the axis of joint 1) or 0x11 (too far, too near).
         """
         if not all(map(math.isfinite, (x, y, z, r))):
@@ -159,7 +182,14 @@ class Kinematics:
     def check(self, x: float, y: float, z: float, r: float) -> Joints:
         """Returns the joints that bring the tool there, within their limits.
 
+        Args:
+            x: mm, forward.
+            y: mm, to the left.
+            z: mm, up.
+            r: Degrees, the tool's rotation.
+
         Raises:
+            ValueError: A number is not finite.
             Unreachable: As `inverse`, and with `alarm` 0x12 where joints would pass their limits.
         """
         joints = self.inverse(x, y, z, r)
@@ -172,7 +202,17 @@ class Kinematics:
         return joints
 
     def check_joints(self, j1: float, j2: float, j3: float, j4: float) -> None:
-        """Raises Unreachable (`alarm` 0x12) if joints pass their limits."""
+        """Raises Unreachable (`alarm` 0x12) if joints pass their limits.
+
+        Args:
+            j1: Degrees, the base.
+            j2: Degrees, the rear arm.
+            j3: Degrees, the forearm.
+            j4: Degrees, the tool.
+
+        Raises:
+            ValueError: An angle is not finite.
+        """
         joints = (j1, j2, j3, j4)
         if not all(map(math.isfinite, joints)):
             raise ValueError(f"joint angles must be finite, not {joints!r}")

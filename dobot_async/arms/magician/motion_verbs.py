@@ -114,6 +114,10 @@ class MotionVerbs(Generic[T]):
             mode: How it gets there, one of the ANGLE modes.
             l: mm along the rail, for an arm that stands on one; see `set_rail`.
             timeout: Seconds.
+
+        Raises:
+            ValueError: An angle is not finite or beyond its limits, or `mode` is no ANGLE mode; `l` without a rail.
+            TypeError: Something is of the wrong type.
         """
         mode = one_of("move_joints", mode, ANGLES)
         numbers = [to_number(name, value) for name, value in (("j1", j1), ("j2", j2), ("j3", j3), ("j4", j4))]
@@ -141,6 +145,11 @@ class MotionVerbs(Generic[T]):
             l: mm along the rail, by which the arm moves as well. No document says what an increment along the rail is,
                 so the arm is told the place itself: where the motion before leads must be known.
             timeout: Seconds.
+
+        Raises:
+            ValueError: A number is not finite, the target is out of reach, or `mode` is no INC mode; `l` without a
+                rail.
+            TypeError: Something is of the wrong type.
         """
         mode = one_of("move_by", mode, INCREMENTS)
         numbers = [to_number(name, value) for name, value in (("x", x), ("y", y), ("z", z), ("r", r))]
@@ -164,11 +173,29 @@ class MotionVerbs(Generic[T]):
         """Moves along the circular arc from here through `via` to `to`, each (x, y, z) or (x, y, z, r).
 
         Manual 2.13.2.
+
+        Args:
+            via: A point on the way.
+            to: Where it ends.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: A point has not 3 or 4 finite numbers, or is out of reach.
         """
         return self.perform(c.SET_ARC_CMD, c.ARCCmd(to_point("via", via), to_point("to", to)), timeout)
 
     def circle(self, via: Sequence[float], to: Sequence[float], *, count: int = 1, timeout: float | None = None) -> T:
-        """Moves `count` times around the circle through here, `via` and `to`, each (x, y, z) or (x, y, z, r)."""
+        """Moves `count` times around the circle through here, `via` and `to`, each (x, y, z) or (x, y, z, r).
+
+        Args:
+            via: A point on the circle.
+            to: Another one.
+            count: How often, 1 or more.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: A point has not 3 or 4 finite numbers, or is out of reach; `count` is below 1.
+        """
         points = to_point("via", via), to_point("to", to)
         return self.perform(c.SET_CIRCLE_CMD, c.CircleCmd(*points, to_whole("count", count, 1, 2**32 - 1)), timeout)
 
@@ -176,13 +203,35 @@ class MotionVerbs(Generic[T]):
         """Moves on along a continuous path (CP), without a halt if the next point is queued in time. Manual 2.12.2.
 
         Anything else between two points, a wait of 0 s too, lets the arm halt there.
+
+        Args:
+            x: mm, forward.
+            y: mm, to the left.
+            z: mm, up.
+            relative: Whether they count from the point before.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: A number is not finite, or the point is out of reach.
         """
         return self.perform(c.SET_CP_CMD, c.CPCmd(cp_mode(relative), *xyz(x, y, z)), timeout)
 
     def engrave_to(
         self, x: float, y: float, z: float, power: float, *, relative: bool = False, timeout: float | None = None
     ) -> T:
-        """Moves on along a continuous path with the laser at 0 to 100 percent (CPLE). Manual 2.12.3."""
+        """Moves on along a continuous path with the laser at 0 to 100 percent (CPLE). Manual 2.12.3.
+
+        Args:
+            x: mm, forward.
+            y: mm, to the left.
+            z: mm, up.
+            power: Percent, 0 to 100.
+            relative: Whether x, y and z count from the point before.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: A number is out of range, or the point out of reach.
+        """
         percent = to_number("power", power, 0, 100, "percent")
         return self.perform(c.SET_CPLE_CMD, c.CPLECmd(cp_mode(relative), *xyz(x, y, z), percent), timeout)
 

@@ -38,9 +38,9 @@ class MagicianQueue(MotionQueue, Verbs[Coroutine[Any, Any, Motion]]):
 
     def __init__(self, executor: MagicianExecutor) -> None:
         super().__init__(executor)
-        self.kinematics = Kinematics()
-        self.declared = Declarations(executor.status.ask)
-        self.inherited = False
+        self.kinematics: Kinematics = Kinematics()
+        self.declared: Declarations = Declarations(executor.status.ask)
+        self.inherited: bool = False
         self._arm = executor
         self._own: Motion | None = None
         self._spare_tools = False

@@ -13,7 +13,12 @@ __all__ = ["Readings"]
 
 
 class Readings:
-    """The part of a Magician that is asked where and who it is."""
+    """The part of a Magician that is asked where and who it is.
+
+    Raises:
+        ReplyTimeout: The arm does not answer in time; each `timeout` is in seconds.
+        ConnectionLost: The link is gone.
+    """
 
     link: Link[Any]
 

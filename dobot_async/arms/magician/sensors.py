@@ -27,13 +27,23 @@ LOOK = 0.02  # seconds between two looks at a sensor
 
 
 class Sensors:
-    """The part of a Magician that reads."""
+    """The part of a Magician that reads.
+
+    Raises:
+        ReplyTimeout: The arm does not answer in time; each `timeout` is in seconds.
+        ConnectionLost: The link is gone.
+        TypeError: An argument is of the wrong type; nothing was sent.
+    """
 
     link: Link[Any]
     queue: MagicianQueue
 
     async def get_input(self, address: int, *, timeout: float | None = None) -> bool:
         """Returns the level of a digital input (1 to 20). Manual 2.16.4.
+
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            timeout: Seconds.
 
         Raises:
             ValueError: The pin is not configured as an input; see `configure_io`.
@@ -43,11 +53,23 @@ class Sensors:
         return bool((await self.link.request(c.GET_IODI, address, timeout=timeout)).level)
 
     async def get_output(self, address: int, *, timeout: float | None = None) -> bool:
-        """Returns the level that a digital output (1 to 20) was set to. Manual 2.16.2."""
+        """Returns the level that a digital output (1 to 20) was set to. Manual 2.16.2.
+
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: An argument is out of range; nothing was sent.
+        """
         return bool((await self.link.request(c.GET_IODO, to_address(address), timeout=timeout)).level)
 
     async def get_adc(self, address: int, *, timeout: float | None = None) -> int:
         """Returns an analog input (1 to 20), 0 to 4095. Manual 2.16.5.
+
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            timeout: Seconds.
 
         Raises:
             ValueError: The pin is not configured as an analog input; see `configure_io`.
@@ -71,6 +93,9 @@ class Sensors:
             on: Whether it is to look; its lamp goes with it.
             version: Which hardware version it is. One that is taken for the other sees nothing.
             timeout: Seconds.
+
+        Raises:
+            ValueError: There is no such port or version.
         """
         value = c.ColorSensor(
             to_flag("on", on), to_choice("port", port, c.ColorPort), to_choice("version", version, c.AccessoryVersion)
@@ -118,6 +143,9 @@ class Sensors:
             on: Whether it is to look.
             version: Which hardware version it is. One that is taken for the other sees nothing.
             timeout: Seconds.
+
+        Raises:
+            ValueError: There is no such port or version.
         """
         value = c.InfraredSensor(
             to_flag("on", on),
@@ -127,7 +155,15 @@ class Sensors:
         await self.link.request(c.SET_INFRARED_SENSOR, value, timeout=timeout)
 
     async def get_infrared(self, port: c.InfraredPort, *, timeout: float | None = None) -> bool:
-        """Returns whether the infrared sensor at a port sees something."""
+        """Returns whether the infrared sensor at a port sees something.
+
+        Args:
+            port: Its socket.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: There is no such port.
+        """
         port = to_choice("port", port, c.InfraredPort)
         return await self.link.request(c.GET_INFRARED_SENSOR, port, timeout=timeout) != 0
 

@@ -23,7 +23,7 @@ __all__ = ["GARBAGE", "SILENCE", "ArmStatus"]
 
 Q = TypeVar("Q")
 R = TypeVar("R")
-logger = logging.getLogger("dobot_async.queue")
+logger: logging.Logger = logging.getLogger("dobot_async.queue")
 SILENCE = 5.0  # seconds without an answer after which what the arm does cannot be seen any more
 GARBAGE = 1 << 32  # an index so far beyond the last one is what some firmware shows while it moves
 CHECK = 1.0  # seconds without progress after which the arm's clock is compared
@@ -53,8 +53,8 @@ class ArmStatus:
     """
 
     def __init__(self, link: Link[Any], restarted: Callable[[], None]) -> None:
-        self.completed = -1
-        self.restarts = 0
+        self.completed: int = -1
+        self.restarts: int = 0
         self._link = link
         self._on_restart = restarted
         self._now = asyncio.get_running_loop().time

@@ -20,6 +20,7 @@ from dobot_async._core.protocol.wire import Command, Number, u64
 from dobot_async._core.queue.executor import Entry, MotionSource, alarmed
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.util.hooks import Hooks
+from dobot_async._core.util.tasks import Cleanup
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import Alarm, faults
 from dobot_async.arms.magician.datagrams import DatagramGuard, Surplus
@@ -53,12 +54,12 @@ class Submission:
     keeper: MagicianKeeper | None = None
 
     def __init__(self, link: Link[Frame], window: int, check: Callable[[Any], None]) -> None:
-        self.cleanup = link.cleanup
+        self.cleanup: Cleanup = link.cleanup
         self.on_unknown: Hooks[[MotionUnknown]] = Hooks()
         self.on_motion: Hooks[[Motion]] = Hooks()
-        self.status = ArmStatus(link, self._restarted)
-        self.ledger = QueueLedger()
-        self.space = QueueSpace(self.status)
+        self.status: ArmStatus = ArmStatus(link, self._restarted)
+        self.ledger: QueueLedger = QueueLedger()
+        self.space: QueueSpace = QueueSpace(self.status)
         self._link = link
         self._window = window
         self._check = check

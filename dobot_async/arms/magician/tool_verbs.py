@@ -28,11 +28,24 @@ class ToolVerbs(Generic[T]):
         """Does, or queues, or collects a command."""
 
     def wait(self, seconds: float, *, timeout: float | None = None) -> T:
-        """Holds the arm's queue for a time, to the millisecond. Manual 2.14.1."""
+        """Holds the arm's queue for a time, to the millisecond. Manual 2.14.1.
+
+        Args:
+            seconds: 0 or more.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: It is below 0, not finite, or more than a WAIT can have.
+        """
         return self.perform(c.SET_WAIT_CMD, c.WAITCmd(milliseconds(seconds)), timeout)
 
     def wait_for_input(self, address: int, *, level: bool = True, timeout: float | None = None) -> T:
         """Holds the arm's queue until a digital input (1 to 20) has a level. Manual 2.15.1.
+
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            level: True for high.
+            timeout: Seconds.
 
         Raises:
             ValueError: The pin is not configured as an input.
@@ -47,6 +60,12 @@ class ToolVerbs(Generic[T]):
     ) -> T:
         """Holds the arm's queue until an analog input (1 to 20) meets a condition (0 to 4095). Manual 2.15.1.
 
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            condition: How the input compares with the threshold.
+            threshold: 0 to 4095.
+            timeout: Seconds.
+
         Raises:
             ValueError: The pin is not configured as an analog input.
         """
@@ -59,6 +78,11 @@ class ToolVerbs(Generic[T]):
         """Sucks, or lets go; `pump=False` also switches the pump off. Manual 2.9.3.
 
         The arm acknowledges it at once; give the air some 0.3 s.
+
+        Args:
+            on: Whether to suck.
+            pump: Whether its pump is on.
+            timeout: Seconds.
         """
         value = c.EndEffectorSuctionCup(to_flag("pump", pump), to_flag("on", on))
         return self.perform(c.SET_END_EFFECTOR_SUCTION_CUP, value, timeout)
@@ -67,6 +91,11 @@ class ToolVerbs(Generic[T]):
         """Closes or opens the gripper; `pump=False` switches its pump off. Manual 2.9.4.
 
         The arm acknowledges it at once, and tells nothing of the gripper; give it some 0.5 s.
+
+        Args:
+            closed: Whether to close it.
+            pump: Whether its pump is on.
+            timeout: Seconds.
         """
         value = c.EndEffectorGripper(to_flag("pump", pump), to_flag("closed", closed))
         return self.perform(c.SET_END_EFFECTOR_GRIPPER, value, timeout)
@@ -76,17 +105,36 @@ class ToolVerbs(Generic[T]):
         raise UnsupportedError("a Magician's gripper is open or closed, nothing between: use gripper(closed)")
 
     def laser(self, on: bool, *, timeout: float | None = None) -> T:
-        """Switches the laser. Manual 2.9.2."""
+        """Switches the laser. Manual 2.9.2.
+
+        Args:
+            on: Whether it burns.
+            timeout: Seconds.
+        """
         on = to_flag("on", on)
         return self.perform(c.SET_END_EFFECTOR_LASER, c.EndEffectorLaser(on, on), timeout)
 
     def configure_io(self, address: int, function: c.IOFunction, *, timeout: float | None = None) -> T:
-        """Says what a pin (1 to 20) is used for; needed once before it is used. Manual 2.16.1."""
+        """Says what a pin (1 to 20) is used for; needed once before it is used. Manual 2.16.1.
+
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            function: What it is used for.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: An argument is out of range; nothing was sent.
+        """
         value = c.IOMultiplexing(to_address(address), to_choice("function", function, c.IOFunction))
         return self.perform(c.SET_IO_MULTIPLEXING, value, timeout)
 
     def set_output(self, address: int, level: bool, *, timeout: float | None = None) -> T:
         """Sets a digital output (1 to 20). Manual 2.16.2.
+
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            level: True for high.
+            timeout: Seconds.
 
         Raises:
             ValueError: The pin is not configured as an output.
@@ -95,6 +143,12 @@ class ToolVerbs(Generic[T]):
 
     def set_pwm(self, address: int, frequency: float, duty_cycle: float, *, timeout: float | None = None) -> T:
         """Sets a PWM output (1 to 20): 10 Hz to 1 MHz, 0 to 100 percent. Manual 2.16.3.
+
+        Args:
+            address: 1 to 20, as the manual numbers the pins.
+            frequency: Hz, 10 to 1,000,000.
+            duty_cycle: Percent, 0 to 100.
+            timeout: Seconds.
 
         Raises:
             ValueError: The pin is not configured for PWM.
@@ -114,6 +168,10 @@ class ToolVerbs(Generic[T]):
             distance: Pulses after which it stops; None runs on.
             motor: 0 or 1.
             timeout: Seconds.
+
+        Raises:
+            ValueError: A number is out of range, or the speed is 0 with a distance.
+            TypeError: One is not whole.
         """
         speed = to_whole("speed", speed, -FASTEST, FASTEST, "pulses/s")
         motor = to_whole("motor", motor, 0, 1)
@@ -144,6 +202,9 @@ class ToolVerbs(Generic[T]):
             distance: mm after which it stops; None runs on.
             motor: 0 or 1.
             timeout: Seconds.
+
+        Raises:
+            ValueError: A number is out of range, or the speed is below one pulse/s.
         """
         factor = above_zero("pulses_per_mm", pulses_per_mm)
         most = FASTEST / factor
@@ -164,6 +225,9 @@ class ToolVerbs(Generic[T]):
             velocity: Percent of the velocities that the parameters say, above 0 and at most 100.
             acceleration: The same of the accelerations; as the velocity unless given.
             timeout: Seconds.
+
+        Raises:
+            ValueError: A ratio is not above 0 and at most 100.
         """
         most = velocity if acceleration is None else acceleration
         ratios = (
@@ -173,7 +237,18 @@ class ToolVerbs(Generic[T]):
         return self.perform(c.SET_PTP_COMMON_PARAMS, c.PTPCommonParams(*ratios), timeout)
 
     def set_home(self, x: float, y: float, z: float, r: float = 0.0, *, timeout: float | None = None) -> T:
-        """Sets the place to which `home` drives from the switches, mm and degrees. Manual 2.6.1."""
+        """Sets the place to which `home` drives from the switches, mm and degrees. Manual 2.6.1.
+
+        Args:
+            x: mm, forward.
+            y: mm, to the left.
+            z: mm, up.
+            r: Degrees, the tool's rotation.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: A number is not finite.
+        """
         numbers = (to_number(name, value) for name, value in (("x", x), ("y", y), ("z", z), ("r", r)))
         return self.perform(c.SET_HOME_PARAMS, c.HOMEParams(*numbers), timeout)
 

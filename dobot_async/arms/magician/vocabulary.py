@@ -27,7 +27,12 @@ Result = tuple[Command[Any, Any], Any]
 MODES = {mode.name.lower().removesuffix("_xyz").replace("_", "-"): mode for mode in c.PTPMode}
 """The ways a Magician moves, by the words for them: movj, movl, jump, ..., movj-angle, movl-inc, ..."""
 
-TOOLS = {"suction": SuctionCup(), "gripper": Gripper(), "pen": Pen(), "laser": Laser()}
+TOOLS: Mapping[str, c.EndEffectorParams] = {
+    "suction": SuctionCup(),
+    "gripper": Gripper(),
+    "pen": Pen(),
+    "laser": Laser(),
+}
 VERSIONS = {"1": c.AccessoryVersion.V1, "2": c.AccessoryVersion.V2}
 FUNCTIONS = {each.name.lower(): each for each in c.IOFunction}
 
@@ -74,6 +79,8 @@ class CheckedVerbs(Verbs[Result]):
                 self._joints = self._after_path(value)
             case c.HOMECmd():
                 self._joints = None
+            case _:
+                pass  # all others leave the arm where it is
 
     def _after_ptp(self, value: c.PTPCmd | c.PTPWithLCmd) -> Joints | None:
         mode, numbers = value.ptp_mode, (value.x, value.y, value.z, value.r)
@@ -128,6 +135,12 @@ XYZR = takes(NUMBER, "x", "y", "z", "r")
 PIN = takes(WHOLE, "address")
 MODE = choice(MODES)
 
+
+def suck(verbs: CheckedVerbs, on: bool) -> Result:
+    """The cup, and its pump with it."""
+    return verbs.suction(on, pump=on)
+
+
 VOCABULARY = Vocabulary(
     "Magician",
     {
@@ -139,7 +152,7 @@ VOCABULARY = Vocabulary(
         "engrave": Verb(CheckedVerbs.engrave_to, (*XYZR[:3], ("power", NUMBER)), 4),
         "wait": Verb(CheckedVerbs.wait, takes(NUMBER, "seconds"), 1),
         "wait-input": Verb(CheckedVerbs.wait_for_input, PIN, 1, {"level": ON_OFF}),
-        "suction": Verb(lambda verbs, on: verbs.suction(on, pump=on), takes(ON_OFF, "on"), 1),
+        "suction": Verb(suck, takes(ON_OFF, "on"), 1),
         "gripper": Verb(CheckedVerbs.gripper, takes(ON_OFF, "closed"), 1, {"pump": ON_OFF}),
         "laser": Verb(CheckedVerbs.laser, takes(ON_OFF, "on"), 1),
         "pin": Verb(CheckedVerbs.configure_io, (*PIN, ("function", choice(FUNCTIONS))), 2),

@@ -8,7 +8,6 @@ The arm keeps all of it without power. The password is written and never read.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv4Network
 from typing import Any
@@ -105,13 +104,13 @@ class WiFi:
         if not ssid:
             raise ValueError("the network's name (SSID) must not be empty")
 
-        steps: Sequence[tuple[Command[Any, None], Any]] = (
+        steps: list[tuple[Command[Any, None], Any]] = [
             (c.SET_WIFI_CONFIG_MODE, True),
             (c.SET_WIFI_SSID, ssid),
             (c.SET_WIFI_PASSWORD, password),
             *addressing(address, netmask, gateway, dns),
             (c.SET_WIFI_CONFIG_MODE, False),
-        )
+        ]
         for command, value in steps:
             self._link.frame(command, value)
 

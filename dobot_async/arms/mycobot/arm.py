@@ -75,8 +75,8 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         self._runner = CobotRunner(self._channel, tolerance, keeper)
         self._executor = HostExecutor(self._runner, link.cleanup)
         self._executor.keeper = keeper
-        self.queue = CobotQueue(self._executor, model)
-        self.following = CobotFollowing(self._channel, self._runner, tolerance, lambda: self.queue)
+        self.queue: CobotQueue = CobotQueue(self._executor, model)
+        self.following: CobotFollowing = CobotFollowing(self._channel, self._runner, tolerance, lambda: self.queue)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
         super().__init__(self._channel, self._runner)
 

@@ -10,7 +10,7 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 from dobot_async._core.protocol.contract import Parser
 from dobot_async._core.protocol.transport import Transport
@@ -43,7 +43,7 @@ class CobotWatch:
     """What one program has made the arm do: it moves while the arm says so, and for a while after the last motion."""
 
     def __init__(self, model: CobotModel, clock: Callable[[], float]) -> None:
-        self.question = request(model, c.IS_MOVING)
+        self.question: Frame = request(model, c.IS_MOVING)
         self._model = model
         self._clock = clock
         self._told = False
@@ -88,16 +88,18 @@ class BridgedCobot(ByKey[Frame]):
 
     filler = b""
     header = f.HEADER
-    encode = staticmethod(f.request)
+    encode: Final = staticmethod(f.request)
     proves_stop = False
 
     def __init__(self, model: CobotModel) -> None:
-        self.model = model.name
-        self.barriers = tuple(request(model, row) for row in BARRIERS if row in model.rows)
-        self.greeting = request(model, c.IS_POWER_ON)
-        self.stopping = (request(model, c.STOP),)
-        self.deny_groups = {"calibration": frozenset(model.rows[row].id for row in CALIBRATION if row in model.rows)}
-        self.readings = {
+        self.model: str = model.name
+        self.barriers: tuple[Frame, ...] = tuple(request(model, row) for row in BARRIERS if row in model.rows)
+        self.greeting: Frame = request(model, c.IS_POWER_ON)
+        self.stopping: Sequence[Frame] = (request(model, c.STOP),)
+        self.deny_groups: dict[str, frozenset[int]] = {
+            "calibration": frozenset(model.rows[row].id for row in CALIBRATION if row in model.rows)
+        }
+        self.readings: dict[str, TelemetryRead[Frame]] = {
             "pose": TelemetryRead(request(model, c.GET_COORDS), 0.2, self._told_coords),
             "joints": TelemetryRead(request(model, c.GET_ANGLES), 0.2, self._told_angles),
             "motion": TelemetryRead(request(model, c.IS_MOVING), 0.2, self._told_motion),

@@ -42,7 +42,7 @@ class Unechoed(Generic[R]):
     """The layout of an answer, but for the bytes of its request."""
 
     def __init__(self, layout: Layout[R], request: bytes) -> None:
-        self.encode = layout.encode
+        self.encode: Callable[[R], bytes] = layout.encode
         self._layout = layout
         self._request = request
 
@@ -79,7 +79,7 @@ class Channel:
         self._answered: set[Command[Any, Any]] = set()
         self._unanswered: Counter[Command[Any, Any]] = Counter()
         self._now = asyncio.get_running_loop().time
-        self.frames = 0
+        self.frames: int = 0
 
     async def ask(self, command: Command[Q, R], value: Q, *, timeout: float | None = None) -> R:
         """Read something; raise as `Link.request` does.

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from dobot_async._core.protocol.layouts import NOTHING
 from dobot_async._core.protocol.rows import Rows
@@ -50,7 +50,10 @@ SLOW = 3.0  # seconds that an arm may take for what its servos have to be asked,
 
 
 ROWS = Rows(Packed, ACK)
-read, ask, write, motion = ROWS.read, ROWS.ask, ROWS.write, ROWS.motion
+read: Final = ROWS.read
+ask: Final = ROWS.ask
+write: Final = ROWS.write
+motion: Final = ROWS.motion
 
 
 # The controller

@@ -18,7 +18,7 @@ WIDE = 1
 class ServoRegister:
     """A register of a servo and its new value: one byte, or two with a mode of 1 behind them."""
 
-    lengths = frozenset({3, 5})
+    lengths: frozenset[int] = frozenset({3, 5})
 
     def encode(self, value: ServoData) -> bytes:
         """Pack a value."""
@@ -49,7 +49,7 @@ class PositionLayout:
         self, angles: Value[tuple[float, ...]], coords: Value[tuple[float, ...]], *, first: bool = False
     ) -> None:
         self.first = first
-        self.layouts = {Position.ANGLES: angles, Position.COORDS: coords}
+        self.layouts: dict[Position, Value[tuple[float, ...]]] = {Position.ANGLES: angles, Position.COORDS: coords}
 
     @property
     def lengths(self) -> frozenset[int] | None:

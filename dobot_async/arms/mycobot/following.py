@@ -80,12 +80,12 @@ class CobotStrategy:
 
     turns = True
     replaces = True
-    check_every = 1.0
+    check_every: float = 1.0
 
     def __init__(self, channel: Channel, runner: CobotRunner, tolerance: Tolerance, speed: int) -> None:
-        self.axes = AXES[: len(channel.model.reach)]
-        self.joints = channel.model.joints
-        self.tolerance = (tolerance[1], tolerance[0])
+        self.axes: tuple[str, ...] = AXES[: len(channel.model.reach)]
+        self.joints: int = channel.model.joints
+        self.tolerance: tuple[float, float] = (tolerance[1], tolerance[0])
         self._channel = channel
         self._runner = runner
         self._speed = speed

@@ -69,8 +69,8 @@ class Parser:
     """
 
     def __init__(self, known: Known) -> None:
-        self.junk_bytes = 0
-        self.bad_frames = 0
+        self.junk_bytes: int = 0
+        self.bad_frames: int = 0
         self._known = known
         self._buffer = bytearray()
 

@@ -62,7 +62,7 @@ class Fixed:
 
     def encode(self, name: str, value: Any, sizes: Sizes) -> bytes:
         """Return the bytes of a field's value."""
-        if value is None and self.optional:
+        if self.optional and value is None:
             return b""
 
         values: list[Any] = [value] if self.count is None else list(value)
@@ -167,7 +167,7 @@ class Value(Generic[T]):
 class Axis(Generic[T]):
     """A record of an axis (1 to 6), a value that is mm on the first three and degrees on the others, and a speed."""
 
-    lengths = frozenset({4})
+    lengths: frozenset[int] = frozenset({4})
 
     def __init__(self, kind: type[T]) -> None:
         self.kind = kind
@@ -193,7 +193,7 @@ class Axis(Generic[T]):
 class Whole:
     """A whole number of one byte or of two."""
 
-    lengths = frozenset({1, 2})
+    lengths: frozenset[int] = frozenset({1, 2})
 
     def encode(self, value: int) -> bytes:
         """Pack a number, into one byte if it fits."""
@@ -211,7 +211,7 @@ class Octets:
     """Some bytes, as numbers: how many is the firmware's affair."""
 
     def __init__(self, low: int, high: int) -> None:
-        self.lengths = frozenset(range(low, high + 1))
+        self.lengths: frozenset[int] = frozenset(range(low, high + 1))
 
     def encode(self, value: Sequence[int]) -> bytes:
         """Pack the numbers."""
@@ -228,7 +228,7 @@ class Octets:
 class Acknowledgement:
     """What an arm may answer to a command: nothing at all, a byte, or the request itself. It says nothing."""
 
-    lengths = frozenset({0, 1})
+    lengths: frozenset[int] = frozenset({0, 1})
 
     def encode(self, value: None) -> bytes:
         """Return the byte that newer firmware answers with."""

@@ -42,7 +42,14 @@ class CobotInfo:
 
 
 class Readings:
-    """The part of `MyCobot` that is no motion. Every call takes `timeout`, in seconds, and raises as `request` does."""
+    """The part of `MyCobot` that is no motion; each `timeout` is in seconds.
+
+    Raises:
+        ReplyTimeout: The arm does not answer in time.
+        CommandRejected: It does not do it.
+        ConnectionLost: The link is gone.
+        ValueError: An argument is out of range, or the model does not know the command; nothing was sent.
+    """
 
     def __init__(self, channel: Channel, runner: CobotRunner) -> None:
         self._channel = channel
@@ -100,7 +107,13 @@ class Readings:
     async def is_in_position(
         self, values: Sequence[float], *, coords: bool = False, timeout: float | None = None
     ) -> bool:
-        """Return whether the arm says that it is at these angles, or coordinates. The vendor calls it unstable."""
+        """Return whether the arm says that it is at these angles, or coordinates. The vendor calls it unstable.
+
+        Args:
+            values: Degrees of all joints, or mm and degrees of all axes.
+            coords: Whether they are coordinates.
+            timeout: Seconds.
+        """
         position = c.Position.COORDS if coords else c.Position.ANGLES
         return await self._channel.ask(c.IS_IN_POSITION, c.InPosition(tuple(values), position), timeout=timeout)
 
@@ -131,11 +144,22 @@ class Readings:
             await self._channel.tell(c.RELEASE_SERVO, c.Release(joint, undamped), timeout=timeout)
 
     async def focus(self, joint: int | None = None, *, timeout: float | None = None) -> None:
-        """Let one servo (from 1) hold its place again, or all."""
+        """Let one servo (from 1) hold its place again, or all.
+
+        Args:
+            joint: Which one; None for all.
+            timeout: Seconds.
+        """
         await self._channel.tell(c.FOCUS_SERVO, joint or 0, timeout=timeout)
 
     async def get_pin(self, pin: int, *, base: bool = False, timeout: float | None = None) -> bool:
-        """Return the level of a pin of the Atom, at the tool, or of the M5 in the base."""
+        """Return the level of a pin of the Atom, at the tool, or of the M5 in the base.
+
+        Args:
+            pin: Its number, on the Atom or the M5.
+            base: Whether it is one of the M5.
+            timeout: Seconds.
+        """
         row = c.GET_BASIC_INPUT if base else c.GET_DIGITAL_INPUT
         return bool((await self._channel.ask(row, pin, timeout=timeout)).level)
 
@@ -164,13 +188,28 @@ class Readings:
         return await self._channel.ask(c.GET_SERVO_STATUS, None, timeout=timeout)
 
     async def get_joint_limits(self, joint: int, *, timeout: float | None = None) -> tuple[float, float]:
-        """Return the least and the greatest angle that the arm allows a joint (from 1)."""
+        """Return the least and the greatest angle that the arm allows a joint (from 1).
+
+        Args:
+            joint: From 1.
+            timeout: Seconds.
+        """
         low = await self._channel.ask(c.GET_JOINT_MIN_ANGLE, joint, timeout=timeout)
         high = await self._channel.ask(c.GET_JOINT_MAX_ANGLE, joint, timeout=timeout)
         return low.angle, high.angle
 
     async def set_joint_limits(self, joint: int, low: float, high: float, *, timeout: float | None = None) -> None:
-        """Set the least and the greatest angle that the arm allows a joint (from 1); in tenths of a degree."""
+        """Set the least and the greatest angle that the arm allows a joint (from 1); in tenths of a degree.
+
+        Args:
+            joint: From 1.
+            low: Degrees.
+            high: Degrees.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: An argument is out of range; nothing was sent.
+        """
         await self._channel.tell(c.SET_JOINT_MIN, c.JointLimit(joint, low), timeout=timeout)
         await self._channel.tell(c.SET_JOINT_MAX, c.JointLimit(joint, high), timeout=timeout)
 
@@ -179,7 +218,15 @@ class Readings:
         return c.Coords(*await self._channel.ask(c.GET_TOOL_REFERENCE, None, timeout=timeout))
 
     async def set_tool(self, *coords: float, timeout: float | None = None) -> None:
-        """Say where the tool's end is, seen from the flange; it counts once `set_end_type(EndType.TOOL)` was said."""
+        """Say where the tool's end is, seen from the flange; it counts once `set_end_type(EndType.TOOL)` was said.
+
+        Args:
+            *coords: x, y, z in mm, rx, ry, rz in degrees.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: An argument is out of range; nothing was sent.
+        """
         await self._channel.tell(c.SET_TOOL_REFERENCE, coords, timeout=timeout)
 
     async def get_world(self, *, timeout: float | None = None) -> c.Coords:
@@ -187,7 +234,15 @@ class Readings:
         return c.Coords(*await self._channel.ask(c.GET_WORLD_REFERENCE, None, timeout=timeout))
 
     async def set_world(self, *coords: float, timeout: float | None = None) -> None:
-        """Say where the arm's base is in the world; it counts once the reference frame is WORLD."""
+        """Say where the arm's base is in the world; it counts once the reference frame is WORLD.
+
+        Args:
+            *coords: x, y, z in mm, rx, ry, rz in degrees.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: An argument is out of range; nothing was sent.
+        """
         await self._channel.tell(c.SET_WORLD_REFERENCE, coords, timeout=timeout)
 
     async def set_reference_frame(self, frame: c.ReferenceFrame, *, timeout: float | None = None) -> None:

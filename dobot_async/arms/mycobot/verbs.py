@@ -33,7 +33,13 @@ Axis = str
 
 
 class Verbs(Generic[T]):
-    """What one can tell the arm to do; T is what each verb returns in its place."""
+    """What one can tell the arm to do; T is what each verb returns in its place. A speed is 1 to 100 percent.
+
+    Raises:
+        ValueError: Of each verb: a number is out of range or beyond the model's limits, or the model does not know the
+            command; nothing was sent.
+        TypeError: Something is of the wrong type.
+    """
 
     @property
     @abstractmethod
@@ -49,11 +55,24 @@ class Verbs(Generic[T]):
         return self.move_joints(*(0.0,) * self.model.joints, speed=speed, timeout=timeout)
 
     def move_joints(self, *angles: float, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Move all joints, one angle for each, within the model's limits."""
+        """Move all joints, one angle for each, within the model's limits.
+
+        Args:
+            *angles: Degrees, from the base on.
+            speed: Percent, 1 to 100.
+            timeout: Seconds.
+        """
         return self.perform(c.SEND_ANGLES, c.JointsMove(angles, speed), timeout)
 
     def move_joint(self, joint: int, angle: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Move one joint (from 1) to an angle."""
+        """Move one joint (from 1) to an angle.
+
+        Args:
+            joint: From 1.
+            angle: Degrees.
+            speed: Percent, 1 to 100.
+            timeout: Seconds.
+        """
         return self.perform(c.SEND_ANGLE, c.JointMove(joint, angle, speed), timeout)
 
     def step_joint(self, joint: int, degrees: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
@@ -145,7 +164,14 @@ class Verbs(Generic[T]):
         return self.perform(MOVE_PARTLY, PartOfMove(coords, speed, mode, relative=True), timeout)
 
     def move_coord(self, axis: Axis, value: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Move the tool along one axis (x, y, z, rx, ry, rz) to a coordinate; the others stay as they are."""
+        """Move the tool along one axis (x, y, z, rx, ry, rz) to a coordinate; the others stay as they are.
+
+        Args:
+            axis: One of x, y, z, rx, ry, rz.
+            value: mm or degrees.
+            speed: Percent, 1 to 100.
+            timeout: Seconds.
+        """
         return self.perform(c.SEND_COORD, c.CoordMove(axis_number(axis), value, speed), timeout)
 
     def step_coord(self, axis: Axis, value: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
@@ -153,7 +179,13 @@ class Verbs(Generic[T]):
         return self.perform(c.JOG_INCREMENT_COORD, c.CoordStep(axis_number(axis), value, speed), timeout)
 
     def move_elbow(self, angle: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Turn the elbow of a myArm 300 about the line from shoulder to wrist, and leave the tool where it is."""
+        """Turn the elbow of a myArm 300 about the line from shoulder to wrist, and leave the tool where it is.
+
+        Args:
+            angle: Degrees.
+            speed: Percent, 1 to 100.
+            timeout: Seconds.
+        """
         return self.perform(c.SET_SOLUTION_ANGLES, c.SetSolutionAngle(angle, speed), timeout)
 
     def move_encoders(self, *encoders: int, speed: int = SPEED, timeout: float | None = None) -> T:
@@ -191,7 +223,14 @@ class Verbs(Generic[T]):
         kind: c.GripperType | None = None,
         timeout: float | None = None,
     ) -> T:
-        """Open the gripper to 0 (closed) to 100 (open) percent, in whole ones; see `gripper`."""
+        """Open the gripper to 0 (closed) to 100 (open) percent, in whole ones; see `gripper`.
+
+        Args:
+            percent: 0 to 100.
+            speed: Percent, 1 to 100.
+            kind: Which gripper it is, where the firmware has to be told.
+            timeout: Seconds.
+        """
         value = to_float(percent, "percent")
         if not 0 <= value <= 100:
             raise ValueError(f"percent must be in 0 (closed) to 100 (open), not {percent!r}")
@@ -211,7 +250,14 @@ class Verbs(Generic[T]):
         return self.perform(c.SET_PIN_MODE, c.PinModeSetting(pin, mode), timeout)
 
     def set_pin(self, pin: int, level: bool, *, base: bool = False, timeout: float | None = None) -> T:
-        """Set a pin of the Atom, at the tool, or of the M5 in the base; high for whatever is true."""
+        """Set a pin of the Atom, at the tool, or of the M5 in the base; high for whatever is true.
+
+        Args:
+            pin: Its number, on the Atom or the M5.
+            level: True for high.
+            base: Whether it is one of the M5.
+            timeout: Seconds.
+        """
         row = c.SET_BASIC_OUTPUT if base else c.SET_DIGITAL_OUTPUT
         return self.perform(row, c.PinLevel(pin, int(bool(level))), timeout)
 

@@ -133,7 +133,7 @@ class Bracket(Generic[T]):
         self.keyword = keyword
         self.read = read
         self.write = write
-        self.pattern = bracket(keyword)
+        self.pattern: re.Pattern[bytes] = bracket(keyword)
 
     def encode(self, value: T) -> bytes:
         """Return keyword and brackets."""

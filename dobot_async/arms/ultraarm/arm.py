@@ -68,7 +68,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
     ) -> None:
         self.link = link
         self.limits = limits
-        self.pump = pump
+        self.pump: Pump = pump
         self._workspace = workspace
         self._runner = UltraArmRunner(
             link, limits, tolerance=tolerance, home_switches=home_switches, on_stop=on_stop, workspace=workspace
@@ -77,8 +77,8 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         self._executor = HostExecutor(self._runner, link.cleanup)
         self._executor.keeper = self._runner.keeper
         self._jogger = Jogger(self._runner, link.cleanup)
-        self.queue = UltraArmQueue(self._executor, pump)
-        self.following = UltraArmFollowing(self._runner, tolerance, lambda: self.queue)
+        self.queue: UltraArmQueue = UltraArmQueue(self._executor, pump)
+        self.following: UltraArmFollowing = UltraArmFollowing(self._runner, tolerance, lambda: self.queue)
         link.on_lost.add(lambda error: self.queue.fail(error))  # noqa: PLW0108 - a fleet gives the arm another queue
 
     @classmethod

@@ -58,7 +58,7 @@ class UltraArmWatch:
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        self.question = question(c.GET_STATUS)
+        self.question: BridgedLine = question(c.GET_STATUS)
         self._clock = clock
         self._told = False
         self._switches = {c.LASER_ON.name: Switch(), c.SET_PWM.name: Switch()}
@@ -129,16 +129,23 @@ class BridgedUltraArm:
 
     model = "ultraarm"
     filler = b""  # it would let the arm do half a line; without it, that and the next one are an error
-    barriers = tuple(BridgedLine(bytes(frame)) for frame in BARRIERS)
+    barriers: tuple[BridgedLine, ...] = tuple(BridgedLine(bytes(frame)) for frame in BARRIERS)
     proves_stop = False
     in_order = True
 
     def __init__(self) -> None:
-        self.greeting = question(c.GET_QUEUE_SIZE)
-        self.stopping = (question(c.JOG_STOP), question(c.LASER_OFF), question(c.SET_PWM, c.PWM(0)))
-        self.escalated_stop = (question(c.RELEASE), *self.stopping)
-        self.deny_groups = {"calibration": frozenset(row.name for row in CALIBRATION)}
-        self.readings = {
+        self.greeting: BridgedLine = question(c.GET_QUEUE_SIZE)
+        self.stopping: tuple[BridgedLine, BridgedLine, BridgedLine] = (
+            question(c.JOG_STOP),
+            question(c.LASER_OFF),
+            question(c.SET_PWM, c.PWM(0)),
+        )
+        self.escalated_stop: tuple[BridgedLine, BridgedLine, BridgedLine, BridgedLine] = (
+            question(c.RELEASE),
+            *self.stopping,
+        )
+        self.deny_groups: dict[str, frozenset[str]] = {"calibration": frozenset(row.name for row in CALIBRATION)}
+        self.readings: dict[str, TelemetryRead[BridgedLine]] = {
             "pose": TelemetryRead(question(c.GET_COORDS), 0.2, lambda reply: told(c.GET_COORDS, reply)),
             "joints": TelemetryRead(question(c.GET_ANGLES), 0.2, lambda reply: told(c.GET_ANGLES, reply)),
             "motion": TelemetryRead(question(c.GET_STATUS), 0.2, lambda reply: told(c.GET_STATUS, reply)),

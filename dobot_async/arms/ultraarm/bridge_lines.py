@@ -83,7 +83,8 @@ class Requests:
     """
 
     def __init__(self) -> None:
-        self.junk_bytes = self.bad_frames = 0
+        self.junk_bytes: int = 0
+        self.bad_frames: int = 0
         self._buffer = b""
         self._first = b""  # the bytes of the first line, until it is known to be a token or none
         self._greeted = False
@@ -129,7 +130,8 @@ class Answers:
     """
 
     def __init__(self) -> None:
-        self.junk_bytes = self.bad_frames = 0
+        self.junk_bytes: int = 0
+        self.bad_frames: int = 0
         self._buffer = b""
         self._asked: deque[BridgedLine] = deque(maxlen=ASKED)
 

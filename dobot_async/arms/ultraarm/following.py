@@ -95,10 +95,10 @@ class UltraArmStrategy:
     joints = 4
     turns = False
     replaces = False
-    check_every = float("inf")  # each look tells errors
+    check_every: float = float("inf")  # each look tells errors
 
     def __init__(self, runner: UltraArmRunner, tolerance: float, mm: float, degrees: float, *, constant: bool) -> None:
-        self.tolerance = (tolerance, tolerance)
+        self.tolerance: tuple[float, float] = (tolerance, tolerance)
         self._runner = runner
         self._constant = constant
         self._told = False

@@ -142,7 +142,7 @@ class Parser:
     """
 
     def __init__(self) -> None:
-        self.junk_bytes = 0
+        self.junk_bytes: int = 0
         self.bad_frames = 0
         self._buffer: bytes = b""
 

@@ -102,7 +102,7 @@ class GCodeReader:
     """
 
     def __init__(self, limits: c.UltraArmLimits, keeper: UltraArmKeeper | None = None) -> None:
-        self.ended = False
+        self.ended: bool = False
         self._keeper = keeper
         self._stand = Stand()
         self._limits = limits
@@ -242,7 +242,7 @@ class GCodeRun:
             before.append(GCodeLine(0, "M16 S0", c.SET_SPEED_MODE, c.ModeOfSpeed(c.SpeedMode.CONSTANT)))
             after.append(GCodeLine(0, "M16 S2", c.SET_SPEED_MODE, c.ModeOfSpeed(c.SpeedMode.RAMPED)))
 
-        self.lines = tuple(lines)
+        self.lines: tuple[GCodeLine, ...] = tuple(lines)
         self._queue = queue
         self._cleanup = cleanup
         self._todo = [*before, *lines, *after] if send and lines else []

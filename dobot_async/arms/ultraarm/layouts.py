@@ -79,7 +79,7 @@ class Words(Generic[T]):
         assert is_dataclass(kind)
         self.kind = kind
         hints = get_type_hints(kind, include_extras=True)
-        self.fields = [field_of(each.name, hints[each.name]) for each in fields(kind)]
+        self.fields: list[TextField] = [field_of(each.name, hints[each.name]) for each in fields(kind)]
 
     def encode(self, value: T) -> bytes:
         """Return the words, each after a blank."""

@@ -23,7 +23,7 @@ class UltraArmQueue(HostQueue, Verbs[Coroutine[Any, Any, Motion]]):
 
     def __init__(self, executor: HostExecutor, pump: Pump) -> None:
         super().__init__(executor)
-        self.pump = pump
+        self.pump: Pump = pump
 
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> Coroutine[Any, Any, Motion]:
         """Queue a command; see `put`."""
@@ -46,4 +46,4 @@ class UltraArmBatch(BatchBuilder, Verbs[Motion]):
 
     def __init__(self, queue: MotionQueue, pump: Pump) -> None:
         super().__init__(queue)
-        self.pump = pump
+        self.pump: Pump = pump

@@ -15,7 +15,9 @@ __all__ = ["Readings"]
 class Readings:
     """The part of an arm that asks; each `timeout` is in seconds, repetitions included.
 
-    Each call raises ReplyTimeout if the arm does not answer, and ConnectionLost if the link is gone.
+    Raises:
+        ReplyTimeout: The arm does not answer in time.
+        ConnectionLost: The link is gone.
     """
 
     def __init__(self, runner: UltraArmRunner) -> None:

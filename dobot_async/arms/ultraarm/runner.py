@@ -72,12 +72,13 @@ class UltraArmRunner:
         on_stop: Literal["release", "finish"],
         workspace: Workspace | None = None,
     ) -> None:
-        self.channel = Channel(link)
-        self.keeper = UltraArmKeeper(workspace, self._stand) if workspace else None
-        self.state = ArmState()
-        self.status = UltraArmPoller(self.channel.read, lambda: link.stats)
-        self.stopper = UltraArmStopper(self.status, self.state, on_stop)
-        self.busy = self.jogging = False
+        self.channel: Channel = Channel(link)
+        self.keeper: UltraArmKeeper | None = UltraArmKeeper(workspace, self._stand) if workspace else None
+        self.state: ArmState = ArmState()
+        self.status: UltraArmPoller = UltraArmPoller(self.channel.read, lambda: link.stats)
+        self.stopper: UltraArmStopper = UltraArmStopper(self.status, self.state, on_stop)
+        self.busy: bool = False
+        self.jogging: bool = False
         self._commands = Acknowledged(self.channel, self.status)
         self._link = link
         self.limits = limits

@@ -51,11 +51,12 @@ class UltraArmPoller:
     """
 
     def __init__(self, read: Callable[..., Awaitable[Any]], stats: Callable[[], LinkStats]) -> None:
-        self.size = 0
+        self.size: int = 0
         self.last: Status | None = None
-        self.rests = 0
-        self.rest_since = -math.inf
-        self.busy = self.set_out = False
+        self.rests: int = 0
+        self.rest_since: float = -math.inf
+        self.busy: bool = False
+        self.set_out: bool = False
         self._read = read
         self._stats = stats
         self._goal: Goal | None = None

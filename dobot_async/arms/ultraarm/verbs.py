@@ -71,6 +71,9 @@ class Verbs(Generic[T]):
             e: Degrees, of what is mounted on the fourth joint.
             speed: mm/s, 1 to 200.
             timeout: Seconds.
+
+        Raises:
+            ValueError: A number is out of range or beyond the limits, or no axis is given; nothing was sent.
         """
         if isinstance(x, (c.UltraArmPose, c.UltraArmCoords)):
             if not (y is None and z is None and e is None):
@@ -95,6 +98,14 @@ class Verbs(Generic[T]):
 
         The sum has to be within the limits: ValueError where that shows at once, else CommandRejected when its turn
         comes, before it is sent. Sent as a place, as `move_to` is.
+
+        Args:
+            x: mm, forward.
+            y: mm, to the left.
+            z: mm, up.
+            e: Degrees, of what is mounted on the fourth joint.
+            speed: mm/s, 1 to 200.
+            timeout: Seconds.
         """
         return self.perform(c.MOVE_BY, c.CoordsMove(*some(x, y, z, e), f=check_speed(speed)), timeout)
 
@@ -108,11 +119,33 @@ class Verbs(Generic[T]):
         speed: float | None = SPEED,
         timeout: float | None = None,
     ) -> T:
-        """Move the joints to angles in degrees. Manual 5, M11."""
+        """Move the joints to angles in degrees. Manual 5, M11.
+
+        Args:
+            j1: Degrees.
+            j2: Degrees.
+            j3: Degrees.
+            j4: Degrees, of what is mounted on it; None leaves it.
+            speed: mm/s, 1 to 200.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: A number is out of range or beyond the limits; nothing was sent.
+        """
         return self.perform(c.MOVE_JOINTS, c.JointsMove(j1, j2, j3, j4, check_speed(speed)), timeout)
 
     def move_joint(self, joint: int, angle: float, *, speed: float | None = SPEED, timeout: float | None = None) -> T:
-        """Move one joint (1 to 4) to an angle in degrees. Manual 5, M10."""
+        """Move one joint (1 to 4) to an angle in degrees. Manual 5, M10.
+
+        Args:
+            joint: 1 to 4.
+            angle: Degrees.
+            speed: mm/s, 1 to 200.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: A number is out of range or beyond the limits; nothing was sent.
+        """
         return self.perform(c.MOVE_JOINT, c.JointMove(joint, angle, check_speed(speed)), timeout)
 
     def wait(self, seconds: float, *, timeout: float | None = None) -> T:
@@ -121,6 +154,9 @@ class Verbs(Generic[T]):
         Args:
             seconds: 0 to 65535. The arm waits whole ones, and the rest passes on this side before the next command.
             timeout: Seconds.
+
+        Raises:
+            ValueError: It is out of range.
         """
         return self.perform(c.WAIT, c.Dwell(check_duration(seconds, "seconds", LONGEST_WAIT)), timeout)
 
@@ -133,7 +169,18 @@ class Verbs(Generic[T]):
         *,
         timeout: float | None = None,
     ) -> T:
-        """Let the arm take its place for another one: coordinates count from there. Manual 5, G92."""
+        """Let the arm take its place for another one: coordinates count from there. Manual 5, G92.
+
+        Args:
+            x: mm, forward.
+            y: mm, to the left.
+            z: mm, up.
+            e: Degrees, of what is mounted on the fourth joint.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: No axis is given, or a number is not finite.
+        """
         return self.perform(c.SET_POSITION, c.Position(*some(x, y, z, e)), timeout)
 
     def absolute(self, *, timeout: float | None = None) -> T:
@@ -148,11 +195,21 @@ class Verbs(Generic[T]):
         return self.perform(c.RELATIVE, None, timeout)
 
     def set_speed_mode(self, mode: c.SpeedMode, *, timeout: float | None = None) -> T:
-        """Say how the arm runs through a series of motions: at constant speed, or each with its ramps."""
+        """Say how the arm runs through a series of motions: at constant speed, or each with its ramps.
+
+        Args:
+            mode: CONSTANT or RAMPED.
+            timeout: Seconds.
+        """
         return self.perform(c.SET_SPEED_MODE, c.ModeOfSpeed(mode), timeout)
 
     def suction(self, on: bool, *, timeout: float | None = None) -> T:
-        """Start or stop the pump; see `pump` of `connect`. Manual 5, M22 and M23."""
+        """Start or stop the pump; see `pump` of `connect`. Manual 5, M22 and M23.
+
+        Args:
+            on: Whether to suck.
+            timeout: Seconds.
+        """
         starts = bool(on) == (self.pump == "manual")
         return self.perform(c.PUMP_ON if starts else c.PUMP_OFF, None, timeout)
 
@@ -163,6 +220,9 @@ class Verbs(Generic[T]):
             closed: Whether to close it.
             speed: 0 to 1500.
             timeout: Seconds.
+
+        Raises:
+            ValueError: The speed is out of range.
         """
         return self.gripper_to(0 if closed else 100, speed=speed, timeout=timeout)
 
@@ -186,6 +246,9 @@ class Verbs(Generic[T]):
             kind: Which gripper, for firmware that knows several.
             mode: How the force gripper grips.
             timeout: Seconds.
+
+        Raises:
+            ValueError: A number is out of range.
         """
         opening = round(check_duration(percent, "percent", FULLY))
         return self.perform(c.SET_GRIPPER, c.GripperSet(opening, speed, kind, mode), timeout)
@@ -199,7 +262,15 @@ class Verbs(Generic[T]):
         return self.perform(c.LASER_ON if on else c.LASER_OFF, None, timeout)
 
     def pwm(self, duty: int, *, timeout: float | None = None) -> T:
-        """Set the laser's duty cycle, 0 to 255. Manual 5, M21."""
+        """Set the laser's duty cycle, 0 to 255. Manual 5, M21.
+
+        Args:
+            duty: 0 to 255.
+            timeout: Seconds.
+
+        Raises:
+            ValueError: It is out of range.
+        """
         return self.perform(c.SET_PWM, c.PWM(duty), timeout)
 
     def fan(self, on: bool, *, timeout: float | None = None) -> T:

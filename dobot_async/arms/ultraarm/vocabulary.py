@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.ultraarm import commands as c
-from dobot_async.arms.ultraarm.verbs import Verbs
+from dobot_async.arms.ultraarm.verbs import Pump, Verbs
 from dobot_async.program.vocabulary import NUMBER, ON_OFF, WHOLE, Verb, Vocabulary, takes
 
 __all__ = ["VOCABULARY"]
@@ -23,7 +23,7 @@ class CheckedVerbs(Verbs[Result]):
     """The verbs, each of which returns its command and value if the arm could take them."""
 
     def __init__(self, options: Mapping[str, Any]) -> None:
-        self.pump = options.get("pump", "manual")
+        self.pump: Pump = options.get("pump", "manual")
         self._limits: c.UltraArmLimits = options.get("limits", c.MANUAL_LIMITS)
         self._at: dict[str, float | None] = dict.fromkeys(AXES)
 

@@ -149,7 +149,8 @@ def of_model(name: str) -> type[MyCobot]:
     class Model(MyCobot):
         @classmethod
         def connect(cls, url: str, **options: Any) -> AbstractAsyncContextManager[Any]:  # type: ignore[override]
-            return super().connect(url, **{"model": name, **options})
+            merged: dict[str, Any] = {"model": name, **options}
+            return super().connect(url, **merged)
 
     return Model
 

@@ -177,11 +177,17 @@ def watch(rate: float, count: int | None) -> None:
     with tracing(here.session.trace) as trace:
         if here.output.terminal:
             with here.output.table(COLUMNS) as draw:
-                show = lambda told: draw([each.cells(name) for name, each in told.items()])  # noqa: E731
+
+                def show(told: Mapping[str, CellReading]) -> None:
+                    draw([each.cells(name) for name, each in told.items()])
+
                 run(observe(here.cell, rate, count, show, trace))
         else:
-            show = lambda told: here.output.answer({"arms": told}, table_text(told))  # noqa: E731
-            run(observe(here.cell, rate, count, show, trace))
+
+            def say(told: Mapping[str, CellReading]) -> None:
+                here.output.answer({"arms": told}, table_text(told))
+
+            run(observe(here.cell, rate, count, say, trace))
 
 
 async def alone(

@@ -86,8 +86,8 @@ class DemoCycle:
 
     def __init__(self, arm: Magician, cycles: int, say: Callable[[str], None]) -> None:
         self.motions: list[Motion] = []
-        self.phase = "homing"
-        self.pieces = cycles * len(PIECES)
+        self.phase: str = "homing"
+        self.pieces: int = cycles * len(PIECES)
         self._arm = arm
         self._cycles = cycles
         self._say = say

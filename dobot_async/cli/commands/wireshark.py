@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib import resources
 from typing import Any
 
 from dobot_async._core.protocol.layouts import Lenient, Text
-from dobot_async._core.protocol.wire import Field, Number, Record
+from dobot_async._core.protocol.wire import Field, Layout, Number, Record
+from dobot_async._core.util.plain import is_row, is_table
 from dobot_async.arms.magician import commands as magician
 from dobot_async.arms.mycobot.layouts import Packed, Value
 from dobot_async.arms.mycobot.models import DEFAULT, MODELS
@@ -52,7 +53,7 @@ def tables() -> Iterator[str]:
     yield f"local ULTRAARM = {lua({row.name: row.section for row in ultraarm.ALL})}"
 
 
-def little(layout: object) -> Spec:
+def little(layout: Layout[Any]) -> Spec:
     """The fields of a Magician's layout."""
     if isinstance(layout, Lenient):
         return little(layout.layout)
@@ -85,12 +86,12 @@ def scalars(name: str, field: Field) -> Iterator[dict[str, Any]]:
         yield {"name": name if scalar.count == 1 else f"{name}{place + 1}", "code": scalar.code}
 
 
-def big(layout: object) -> Spec:
+def big(layout: Layout[Any]) -> Spec:
     """The fields of a layout of the myCobot family."""
     if not isinstance(layout, (Packed, Value)):
         return None
 
-    found = []
+    found: list[dict[str, Any]] = []
     for name, fixed, _ in layout.parts:
         if fixed.optional or (fixed.count and fixed.count not in layout.sizes):
             return None
@@ -106,11 +107,11 @@ def big(layout: object) -> Spec:
 
 def lua(value: Any) -> str:
     """A value as Lua writes it."""
-    if isinstance(value, Mapping):
+    if is_table(value):
         items = (f"[{lua(key)}] = {lua(each)}" for key, each in value.items() if each is not None)
         return "{ " + ", ".join(items) + " }"
 
-    if isinstance(value, list):
+    if is_row(value):
         return "{ " + ", ".join(map(lua, value)) + " }"
 
     return str(value) if isinstance(value, int) else json.dumps(value)

@@ -85,7 +85,7 @@ class ArmView(ABC):
 
     def __init__(self, arm: Any) -> None:
         self.arm = arm
-        self.tools = Tools()
+        self.tools: Tools = Tools()
         self.percent: float | None = None
         self._taught = taught(arm)
         self._jogs_at: float | None = None

@@ -29,7 +29,7 @@ class MagicianView(ArmView):
     """A Magician."""
 
     family = "magician"
-    features = (
+    features: ClassVar[tuple[str, ...]] = (
         "suction",
         "gripper",
         "laser",
@@ -40,7 +40,7 @@ class MagicianView(ArmView):
         "engrave",
         "end_effector",
     )
-    parts = (
+    parts: Sequence[Part] = (
         Part("base", "cylinder", 60.0),
         Part("rear arm", "box", 22.0),
         Part("forearm", "box", 18.0),
@@ -100,7 +100,7 @@ class MagicianView(ArmView):
     async def set_speed(self, percent: float) -> None:
         """The ratios of PTP."""
         await self.arm.set_speed(percent)
-        self.percent = percent
+        self.percent: float | None = percent
 
     async def conveyor(self, speed: int, motor: int) -> None:
         """A stepper."""

@@ -23,14 +23,14 @@ class CobotView(ArmView):
     """A myArm, a myCobot, a mechArm or a myPalletizer; where its joints are, as the drawings of the vendor have it."""
 
     family = "mycobot"
-    features = ("gripper", "gripper_to", "outputs", "inputs", "power")
+    features: ClassVar[tuple[str, ...]] = ("gripper", "gripper_to", "outputs", "inputs", "power")
     pins: ClassVar[Mapping[str, Sequence[int]]] = {"outputs": (19, 23, 26, 33), "inputs": (19, 22, 26, 32, 39)}
     arm: MyCobot
 
     def __init__(self, arm: Any) -> None:
         super().__init__(arm)
         count = len(self.points([0.0] * self.arm.model.joints)) - 1
-        self.parts = tuple(
+        self.parts: Sequence[Part] = tuple(
             Part("base" if not number else f"link {number}", "cylinder", THICK - (THICK - THIN) * number / count)
             for number in range(count)
         )

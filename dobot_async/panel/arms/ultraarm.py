@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 from dobot_async import UltraArm, UltraArmJog
 from dobot_async.arms.ultraarm import commands as u
@@ -20,8 +21,8 @@ class UltraArmView(ArmView):
     """An ultraArm; where its joints are is inferred from the ranges that the vendor names."""
 
     family = "ultraarm"
-    features = ("suction", "gripper", "gripper_to", "laser", "engrave", "power")
-    parts = (
+    features: ClassVar[tuple[str, ...]] = ("suction", "gripper", "gripper_to", "laser", "engrave", "power")
+    parts: Sequence[Part] = (
         Part("base", "cylinder", 55.0),
         Part("rear arm", "box", 20.0),
         Part("forearm", "box", 16.0),

@@ -34,7 +34,7 @@ class BlueZ:
         self._bus = bus
         self._scanning: set[str] = set()
         self._modules: dict[str, BleModule] = {}
-        self.objects = Objects(bus, TYPES)
+        self.objects: Objects = Objects(bus, TYPES)
 
     async def start(self) -> None:
         """Appears on the bus."""
@@ -96,12 +96,12 @@ class BlueZ:
     def answer(self, call: Message, signature: str = "", *body: Any) -> None:
         """Answers a call."""
         if self._bus.connected:
-            self._bus.send(Message.new_method_return(call, signature, list(body)))
+            self._bus.say(Message.new_method_return(call, signature, list(body)))
 
     def refuse(self, call: Message, refused: DBusRefusal) -> None:
         """Answers a call with an error."""
         if self._bus.connected:
-            self._bus.send(Message.new_error(call, refused.name, refused.text))
+            self._bus.say(Message.new_error(call, refused.name, refused.text))
 
     def get_managed_objects(self, call: Message) -> None:
         """ObjectManager.GetManagedObjects."""

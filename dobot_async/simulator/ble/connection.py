@@ -30,7 +30,7 @@ class GattConnection:
     """
 
     def __init__(self, radio: RadioSettings) -> None:
-        self.link_layer = LinkLayer(radio)
+        self.link_layer: LinkLayer = LinkLayer(radio)
         self.line: SerialBridge | None = None
         self._loop = asyncio.get_running_loop()
         self._waiting: dict[str, Message] = {}

@@ -105,6 +105,10 @@ class PatientBus(MessageBus):
         writer.sock = PatientSocket(writer.sock)
         return self
 
+    def say(self, message: Message) -> None:
+        """Send a message; nobody waits for it."""
+        self.send(message)  # pyright: ignore[reportUnknownMemberType] - dbus-fast says nothing of what its Future has
+
     async def close(self) -> None:
         """Disconnects, and frees what that leaves."""
         self.disconnect()
@@ -121,7 +125,7 @@ class Objects:
         types: The D-Bus signature of each property.
     """
 
-    def __init__(self, bus: MessageBus, types: dict[str, str]) -> None:
+    def __init__(self, bus: PatientBus, types: dict[str, str]) -> None:
         self._bus = bus
         self._types = types
         self._all: dict[str, dict[str, dict[str, Any]]] = {}
@@ -167,4 +171,4 @@ class Objects:
 
     def _signal(self, path: str, interface: str, member: str, signature: str, *body: Any) -> None:
         if self._bus.connected:
-            self._bus.send(Message.new_signal(path, interface, member, signature, list(body)))
+            self._bus.say(Message.new_signal(path, interface, member, signature, list(body)))

@@ -35,7 +35,7 @@ class BlueZTestbed:
     """
 
     def __init__(self, address: str, daemon: asyncio.subprocess.Process) -> None:
-        self.environment = {ADDRESS: address}
+        self.environment: dict[str, str] = {ADDRESS: address}
         self.bluez: BlueZ | None = None
         self._address = address
         self._daemon = daemon

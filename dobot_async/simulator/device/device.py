@@ -49,8 +49,8 @@ class Device:
         options: DeviceOptions | None = None,
         on_finish: Callable[[Executed], None] | None = None,
     ) -> None:
-        self.options = options or DeviceOptions()
-        self.accepted = 0
+        self.options: DeviceOptions = options or DeviceOptions()
+        self.accepted: int = 0
         self.on_finish = on_finish
         self.scene: Surroundings | None = None
         self._clock = clock

@@ -90,7 +90,7 @@ class Timeline:
         begin: Callable[[Work], Activity | None],
         finished: Callable[[Executed], None],
     ) -> None:
-        self.time = time
+        self.time: float = time
         self.queue: deque[tuple[int, Work]] = deque()
         self.running: Active | None = None
         self.aside: Active | None = None
@@ -155,12 +155,12 @@ class Timeline:
     def boot(self) -> None:
         """Makes the state that of an arm after power-up; what goes on has been ended before."""
         self.queue.clear()
-        self.next_index = self._options.first_index
-        self.last_index = self._options.initial_index
-        self.alarms = set(self._options.power_up_alarms)
+        self.next_index: int = self._options.first_index
+        self.last_index: int = self._options.initial_index
+        self.alarms: set[int] = set(self._options.power_up_alarms)
         self.started = True
         self.frozen_at: float | None = None
-        self.powered = self.time
+        self.powered: float = self.time
 
     def run(self, until: float) -> None:
         """Takes all steps that are due; does nothing where a step itself calls."""

@@ -106,7 +106,7 @@ class SimulatedMagician(MagicianBody):
         """
         super().__init__(clock, options, limits or REACH, homed=homed)
         self.quirks = quirks
-        self.counters = Counters()
+        self.counters: Counters = Counters()
         self._clock_speed: float = getattr(clock, "speed", 1.0)
 
     @property

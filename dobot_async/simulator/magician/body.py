@@ -52,12 +52,12 @@ class MagicianBody:
     def __init__(
         self, clock: Callable[[], float], options: DeviceOptions | None, limits: JointLimits, *, homed: bool
     ) -> None:
-        self.device = Device(clock, (*HOME_JOINTS, 0.0), options or MAGICIAN, self._finished)
-        self.state = State(lambda: self.device.now, limits, homed=homed)
+        self.device: Device = Device(clock, (*HOME_JOINTS, 0.0), options or MAGICIAN, self._finished)
+        self.state: State = State(lambda: self.device.now, limits, homed=homed)
         self.program: StoredProgram | None = None
-        self.color = c.Color(0, 0, 0)
+        self.color: c.Color = c.Color(0, 0, 0)
         self.color_version = self.infrared_version = c.AccessoryVersion.V1
-        self.infrared = dict.fromkeys(c.InfraredPort, False)
+        self.infrared: dict[c.InfraredPort, bool] = dict.fromkeys(c.InfraredPort, False)
         self._effects = CommandEffects(self.state)
         self._downloading = False
         self._taught = False

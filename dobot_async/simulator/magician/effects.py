@@ -35,7 +35,7 @@ class CommandEffects:
     """
 
     def __init__(self, state: State) -> None:
-        self.motions = Motions(state)
+        self.motions: Motions = Motions(state)
         self._state = state
         self._jogging: c.JOGCmd | None = None
 

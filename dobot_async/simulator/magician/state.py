@@ -7,7 +7,7 @@ apart by address. Two tables say what stands in them: FLASH when the arm is made
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, TypeVar
 
 from dobot_async._core.protocol.wire import Command
@@ -103,7 +103,7 @@ LATENCIES: Mapping[Command[Any, None], float] = {
 JOINING = 2.0
 """Seconds that the Wi-Fi module needs to join a network, from the last setting on."""
 
-WIFI = {
+WIFI: Collection[Command[Any, None]] = {
     c.SET_WIFI_CONFIG_MODE,
     c.SET_WIFI_SSID,
     c.SET_WIFI_PASSWORD,
@@ -113,7 +113,12 @@ WIFI = {
     c.SET_WIFI_DNS,
 }
 
-SLOTS = {c.SET_IO_MULTIPLEXING: "address", c.SET_IODO: "address", c.SET_IOPWM: "address", c.SET_INFRARED_SENSOR: "port"}
+SLOTS: Mapping[Command[Any, None], str] = {
+    c.SET_IO_MULTIPLEXING: "address",
+    c.SET_IODO: "address",
+    c.SET_IOPWM: "address",
+    c.SET_INFRARED_SENSOR: "port",
+}
 
 
 class Motor:
@@ -124,7 +129,7 @@ class Motor:
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
-        self.speed = 0
+        self.speed: int = 0
         self._now = now
         self._since = now()
         self._pulses = 0.0
@@ -160,11 +165,11 @@ class State:
 
     def __init__(self, now: Callable[[], float], limits: JointLimits, *, homed: bool) -> None:
         self.limits = limits
-        self.homed = homed
-        self.motors = (Motor(now), Motor(now))
-        self.lost_steps = [0.0] * 4
+        self.homed: bool = homed
+        self.motors: tuple[Motor, Motor] = (Motor(now), Motor(now))
+        self.lost_steps: list[float] = [0.0] * 4
         self.left_at = (0.0,) * 5 if homed else LEFT_AT
-        self.levelled = 0.0
+        self.levelled: float = 0.0
         self.networks: Mapping[str, str] | None = None
         self._now = now
         self._registers = {(row.id, 0): value for row, value in FLASH.items()}

@@ -101,7 +101,7 @@ class SimulatedMyCobot(MyCobotBody):
         """
         super().__init__(clock, model_of(model), options, play=quirks.play, gripper=quirks.gripper)
         self.quirks = quirks
-        self.counters = MyCobotCounters()
+        self.counters: MyCobotCounters = MyCobotCounters()
         wanted = quirks.acknowledges
         wanted = self.model.acknowledges if wanted is None else wanted
         self._acknowledged = frozenset(self.model.rows if wanted is True else wanted or ())

@@ -59,15 +59,15 @@ class MyCobotBody:
         gripper: bool = True,
     ) -> None:
         self.model = model
-        self.device = Device(clock, (0.0,) * model.joints, options or MYCOBOT)
+        self.device: Device = Device(clock, (0.0,) * model.joints, options or MYCOBOT)
         self.ways: SegmentPlanner = SegmentPlanner(model, play)
-        self.gripper = SimulatedGripper(lambda: self.device.now, plugged_in=gripper)
-        self.powered = True
+        self.gripper: SimulatedGripper = SimulatedGripper(lambda: self.device.now, plugged_in=gripper)
+        self.powered: bool = True
         self.released: set[int] = set()
         self.errors: dict[int, int] = {}
-        self.error = 0
+        self.error: int = 0
         self.servos_lost = False
-        self.color = c.RGB(0, 0, 0)
+        self.color: c.RGB = c.RGB(0, 0, 0)
         origin = (0.0,) * len(model.reach)
         self.settings: dict[Command[Any, Any], Any] = {
             c.SET_FRESH_MODE: False,

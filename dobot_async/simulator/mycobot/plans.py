@@ -59,18 +59,31 @@ def one_encoder(arm: MyCobotBody, value: c.SetEncoder) -> Segment:
     return to_joints(arm, {value.joint - 1: (value.encoder - CENTRE) / STEPS}, value.speed)
 
 
+def joint_step(arm: MyCobotBody, value: c.JointMove) -> Segment:
+    """One joint by an angle."""
+    place = value.joint - 1
+    return to_joints(arm, {place: arm.joints[place] + value.angle}, value.speed)
+
+
+def coord_step(arm: MyCobotBody, value: c.CoordStep) -> Segment:
+    """One coordinate by a distance or an angle."""
+    place = value.axis - 1
+    return to_point(arm, {place: arm.coords[place] + value.value}, value.speed, None)
+
+
+def by_place(values: Sequence[float]) -> dict[int, float]:
+    """Values, by the places of their joints or axes."""
+    return dict(enumerate(values))
+
+
 PLANS: Mapping[Command[Any, Any], Callable[[MyCobotBody, Any], Segment]] = {
-    c.SEND_ANGLES: lambda arm, value: to_joints(arm, dict(enumerate(value.angles)), value.speed),
+    c.SEND_ANGLES: lambda arm, value: to_joints(arm, by_place(value.angles), value.speed),
     c.SEND_ANGLE: lambda arm, value: to_joints(arm, {value.joint - 1: value.angle}, value.speed),
     c.JOG_ABSOLUTE: lambda arm, value: to_joints(arm, {value.joint - 1: value.angle}, value.speed),
-    c.JOG_INCREMENT: lambda arm, value: to_joints(
-        arm, {value.joint - 1: arm.joints[value.joint - 1] + value.angle}, value.speed
-    ),
-    c.SEND_COORDS: lambda arm, value: to_point(arm, dict(enumerate(value.coords)), value.speed, value.mode),
+    c.JOG_INCREMENT: joint_step,
+    c.SEND_COORDS: lambda arm, value: to_point(arm, by_place(value.coords), value.speed, value.mode),
     c.SEND_COORD: lambda arm, value: to_point(arm, {value.axis - 1: value.value}, value.speed, None),
-    c.JOG_INCREMENT_COORD: lambda arm, value: to_point(
-        arm, {value.axis - 1: arm.coords[value.axis - 1] + value.value}, value.speed, None
-    ),
+    c.JOG_INCREMENT_COORD: coord_step,
     c.SET_SOLUTION_ANGLES: lambda arm, value: arm.ways.elbow(arm.joints, value.angle, value.speed),
     c.SET_ENCODER: one_encoder,
     c.SET_ENCODERS: lambda arm, value: to_joints(arm, of_encoders(value.encoders), value.speed),

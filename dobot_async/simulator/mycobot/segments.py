@@ -15,7 +15,7 @@ from dobot_async.simulator.device.path import Segment, joint_segment
 from dobot_async.simulator.device.profile import SpeedLimits, shared
 from dobot_async.simulator.device.work import DeviceFault, Vector
 from dobot_async.simulator.mycobot.elbow import turn_elbow
-from dobot_async.simulator.mycobot.kinematics import KINEMATICS, Chain, Transform
+from dobot_async.simulator.mycobot.kinematics import KINEMATICS, Chain, InverseSolver, Transform
 
 __all__ = ["NO_INVERSE", "NO_LINE", "SegmentPlanner"]
 
@@ -40,9 +40,9 @@ class SegmentPlanner:
 
     def __init__(self, model: CobotModel, play: float = 0.0) -> None:
         self.model = model
-        self.play = tuple(play * sign for sign in SIGNS[: model.joints])
-        self.limits = list(model.joint_limits)
-        self.solver = KINEMATICS[model.name]
+        self.play: tuple[float, ...] = tuple(play * sign for sign in SIGNS[: model.joints])
+        self.limits: list[tuple[float, float]] = list(model.joint_limits)
+        self.solver: InverseSolver = KINEMATICS[model.name]
 
     def to_joints(
         self, start: Vector, target: Sequence[float], speed: float, pace: SpeedLimits | None = None

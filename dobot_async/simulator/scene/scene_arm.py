@@ -118,7 +118,7 @@ class ScenePlace:
         self.arm: SceneArm = arm
         self.mount = mount
         self.held: Workpiece | None = None
-        self.moved = False
+        self.moved: bool = False
         self._stock = stock
         self._note = note
         self._gone: Placement | None = None

@@ -58,7 +58,7 @@ class RunningBelt:
 
     def __init__(self, belt: Belt, base: Placement) -> None:
         self.belt = belt
-        self.solid = Solid(base, belt.size)
+        self.solid: Solid = Solid(base, belt.size)
         self._run = 0.0  # mm before the motor was plugged in
         self._pulses: Callable[[], int] | None = None
         self._from = 0
@@ -101,8 +101,8 @@ class Workpiece:
 
     def __init__(self, piece: Piece, carrier: Carrier, still: Callable[[], AbstractContextManager[None]]) -> None:
         self.piece = piece
-        self.carrier = carrier
-        self.offset = Placement()
+        self.carrier: Carrier = carrier
+        self.offset: Placement = Placement()
         self._time_stands_still = still
         self._still: Solid | None = None  # while it stands on what never moves, for most pieces do
 
@@ -174,7 +174,7 @@ class Stock:
     """
 
     def __init__(self, table: float, blocks: Iterable[Block], belts: Iterable[Belt]) -> None:
-        self.table = Standing("table", Solid(Placement(z=table - DEEP), (WIDE, WIDE, DEEP)))
+        self.table: Standing = Standing("table", Solid(Placement(z=table - DEEP), (WIDE, WIDE, DEEP)))
         blocks, belts = tuple(blocks), tuple(belts)
         self._blocks = [Standing(each.name, Solid(self._base(each.at, each.yaw), each.size)) for each in blocks]
         self.belts: Sequence[RunningBelt] = [RunningBelt(each, self._base(each.at, each.yaw)) for each in belts]

@@ -102,9 +102,9 @@ class SimulatedUltraArm:
             homed: Whether it has been home already; a real arm has not, and a `sim:` URL begins with one that has.
         """
         self._registers = Registers(homed=homed, constant_speed=quirks.constant_speed)
-        self.device = Device(clock, (0.0, 0.0, 0.0, 0.0), options or ULTRAARM)
+        self.device: Device = Device(clock, (0.0, 0.0, 0.0, 0.0), options or ULTRAARM)
         self.quirks = quirks
-        self.counters = UltraArmCounters()
+        self.counters: UltraArmCounters = UltraArmCounters()
         self._effects = CommandEffects(self._registers)
 
     @property

@@ -101,7 +101,7 @@ class CommandEffects:
 
     def __init__(self, registers: Registers) -> None:
         self.registers = registers
-        self.missed = 0
+        self.missed: int = 0
 
     def make(self, row: Command[Any, Any], value: Any) -> Work:
         """Returns what the command does when its turn comes."""
@@ -162,8 +162,13 @@ def plus(a: Vector, b: Vector) -> Vector:
 class Geometry:
     """The arm's kinematics, as ways in space need them."""
 
-    forward = staticmethod(forward)
-    inverse = staticmethod(inverse)
+    def forward(self, joints: Vector) -> Vector:
+        """The point of these joints."""
+        return forward(joints)
+
+    def inverse(self, point: Vector) -> Vector:
+        """The joints of this point; raises DeviceFault where there are none."""
+        return inverse(point)
 
 
 def move_coords(registers: Registers, joints: Vector, value: c.CoordsMove) -> Activity:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Collection, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any
 
@@ -13,7 +13,7 @@ from dobot_async.arms.magician.arm import Magician
 from dobot_async.arms.magician.kinematics import Kinematics
 from dobot_async.handling.arms import settle_time
 from dobot_async.teaching.base import RecordingLimits, TaughtArm, clip
-from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
+from dobot_async.teaching.recording import Mode, PathSample, Recording, TaughtStep
 
 __all__ = ["MagicianRecordingLimits", "TaughtMagician"]
 
@@ -26,9 +26,9 @@ class MagicianRecordingLimits(RecordingLimits):
     """The joints and their limits, with the tool that is on the arm."""
 
     family = "magician"
-    axes = ("x", "y", "z", "r")
+    axes: tuple[str, ...] = ("x", "y", "z", "r")
     joints = 4
-    modes = ("point", "line", "joints", "jump", "arc")
+    modes: Collection[str] = ("point", "line", "joints", "jump", "arc")
 
     def __init__(self, kinematics: Kinematics) -> None:
         self.kinematics = kinematics
@@ -90,7 +90,7 @@ class TaughtMagician(TaughtArm):
     """A Magician."""
 
     arm: Magician
-    mode = "point"
+    mode: Mode = "point"
     turn = "r"
 
     def __init__(self, arm: Magician) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Collection, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.mycobot.models import AXES, DEFAULT, MODELS, CobotModel
 from dobot_async.arms.mycobot.params import MoveMode
 from dobot_async.teaching.base import RecordingLimits, TaughtArm, clip
-from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
+from dobot_async.teaching.recording import Mode, PathSample, Recording, TaughtStep
 
 __all__ = ["CobotRecordingLimits", "TaughtCobot"]
 
@@ -22,13 +22,13 @@ class CobotRecordingLimits(RecordingLimits):
     """A model's joints, and its ranges of coordinates."""
 
     family = "mycobot"
-    modes = ("point", "line", "joints")
-    tools = ("gripper",)
+    modes: Collection[str] = ("point", "line", "joints")
+    tools: Collection[str] = ("gripper",)
 
     def __init__(self, model: CobotModel) -> None:
         self.model = model
-        self.axes = AXES[: len(model.reach)]
-        self.joints = model.joints
+        self.axes: tuple[str, ...] = AXES[: len(model.reach)]
+        self.joints: int = model.joints
 
     @classmethod
     def of(cls, recording: Recording) -> CobotRecordingLimits:
@@ -62,12 +62,12 @@ class TaughtCobot(TaughtArm):
     """A myCobot, or another model of its family."""
 
     arm: MyCobot
-    mode = "joints"  # a pose alone leaves open how the elbow is
+    mode: Mode = "joints"  # a pose alone leaves open how the elbow is
 
     def __init__(self, arm: MyCobot) -> None:
         super().__init__(arm)
-        self.limits = CobotRecordingLimits(arm.model)
-        self.turn = self.limits.axes[-1]
+        self.limits: RecordingLimits = CobotRecordingLimits(arm.model)
+        self.turn: str = self.limits.axes[-1]
 
     @property
     def model(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Collection, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 
 from dobot_async.arms.ultraarm import commands as c
@@ -11,7 +11,7 @@ from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.arms.ultraarm.verbs import SPEED
 from dobot_async.errors import CommandRejected
 from dobot_async.teaching.base import RecordingLimits, TaughtArm, clip
-from dobot_async.teaching.recording import PathSample, Recording, TaughtStep
+from dobot_async.teaching.recording import Mode, PathSample, Recording, TaughtStep
 
 __all__ = ["TaughtUltraArm", "UltraArmRecordingLimits"]
 
@@ -22,9 +22,9 @@ class UltraArmRecordingLimits(RecordingLimits):
     """The ranges of joints and coordinates."""
 
     family = "ultraarm"
-    axes = ("x", "y", "z", "e")
+    axes: tuple[str, ...] = ("x", "y", "z", "e")
     joints = 4
-    modes = ("point", "line", "joints")
+    modes: Collection[str] = ("point", "line", "joints")
 
     def __init__(self, limits: c.UltraArmLimits) -> None:
         self.limits = limits
@@ -49,12 +49,12 @@ class TaughtUltraArm(TaughtArm):
     """An ultraArm P340."""
 
     arm: UltraArm
-    mode = "point"
+    mode: Mode = "point"
     turn = ""  # the protocol jogs x, y, z and three joints
 
     def __init__(self, arm: UltraArm) -> None:
         super().__init__(arm)
-        self.limits = UltraArmRecordingLimits(arm.limits)
+        self.limits: RecordingLimits = UltraArmRecordingLimits(arm.limits)
 
     async def move(self, step: TaughtStep, percent: float | None) -> None:
         """G0, G1 or M11."""

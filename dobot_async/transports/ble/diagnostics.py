@@ -6,7 +6,7 @@ for "not connected" alone. Here each gets a sentence, and whether another attemp
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,7 +44,7 @@ NOT_FOUND = (
 )
 
 
-REASONS = {
+REASONS: Mapping[Reason, str] = {
     Reason.NO_BLUETOOTH: NO_ADAPTER,
     Reason.NO_BLE_CENTRAL_ROLE: NO_CENTRAL,
     Reason.POWERED_OFF: OFF,

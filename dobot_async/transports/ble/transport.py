@@ -54,7 +54,7 @@ class BleTransport(InputBuffer):
 
     in_flight = 1
     window = 1
-    reorder_window = 0.0
+    reorder_window: float = 0.0
 
     def __init__(self, seen: SeenDevice, *, url: str, pace: float, adapter: str | None, lock: DeviceLock) -> None:
         super().__init__()

@@ -15,6 +15,7 @@ from urllib.parse import SplitResult, urlencode
 
 from dobot_async.errors import ConnectFailed
 from dobot_async.transports.options import Option, options, words
+from dobot_async.transports.zenoh.typed import settable
 
 if TYPE_CHECKING:
     import zenoh
@@ -31,10 +32,10 @@ RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor":
 CONFIGURATION = "ZENOH_CONFIG"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 WHERE_IN_ZENOH = re.compile(r" at /\S+\.rs:\d+\.?")
-OWN = {"mode": "peer", "connect/retry": RETRY}
+OWN: dict[str, Any] = {"mode": "peer", "connect/retry": RETRY}
 NOBODY: dict[str, list[str]] = {"router": [], "peer": [], "client": []}
 ALONE = {"scouting/multicast/enabled": False, "scouting/gossip/enabled": False}
-THIS_COMPUTER = {
+THIS_COMPUTER: dict[str, Any] = {
     "listen/endpoints": ["tcp/127.0.0.1:0"],
     "scouting/multicast/autoconnect": NOBODY,
     "scouting/gossip/enabled": False,
@@ -95,7 +96,7 @@ class ZenohConfig:
         try:
             config: zenoh.Config = kind.from_file(path) if path else kind()
             for key, value in self._settings(config, serving=serving, file=bool(path)).items():
-                config.insert_json5(key, json.dumps(value))
+                settable(config).insert_json5(key, json.dumps(value))
         except error_kind as error:
             raise ValueError(f"cannot use the Zenoh configuration {path}: {reason(error)}") from None
 

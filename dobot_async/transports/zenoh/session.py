@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from dobot_async._core.util.tasks import run_shielded, run_within
 from dobot_async.errors import ConnectFailed
 from dobot_async.transports.zenoh.config import ZenohConfig, library, reason
+from dobot_async.transports.zenoh.typed import publishing
 
 if TYPE_CHECKING:
     import zenoh
@@ -41,8 +42,8 @@ class KeyExpressions:
     """The keys of one arm."""
 
     def __init__(self, name: str) -> None:
-        self.arm = f"{ROOT}/{name}/@arm"
-        self.link = f"{ROOT}/{name}/@link"
+        self.arm: str = f"{ROOT}/{name}/@arm"
+        self.link: str = f"{ROOT}/{name}/@link"
         self._name = name
 
     def reading(self, topic: str) -> str:
@@ -58,7 +59,7 @@ class ZenohSession:
     """
 
     def __init__(self, place: ZenohConfig, *, serving: bool = False) -> None:
-        self.crossing = LoopBridge()
+        self.crossing: LoopBridge = LoopBridge()
         self._place = place
         self._serving = serving
         self._zenoh: zenoh.Session | None = None
@@ -100,7 +101,8 @@ class ZenohSession:
         """
         zenoh = library()
         control = zenoh.CongestionControl.BLOCK if waits else zenoh.CongestionControl.DROP
-        return partial(self.raw.put, key, congestion_control=control, priority=zenoh.Priority.REAL_TIME, express=True)
+        put = publishing(self.raw).put
+        return partial(put, key, congestion_control=control, priority=zenoh.Priority.REAL_TIME, express=True)
 
     async def tokens(self, key: str) -> list[str]:
         """Returns the keys of the liveliness tokens that match a key, as far as everybody answers in time."""
@@ -121,7 +123,7 @@ class ZenohSession:
         session, self._zenoh = self._zenoh, None
         if session:
             with suppress(TimeoutError, library().ZError):
-                await run_shielded(run_within(CLOSED, asyncio.to_thread(session.close)))
+                await run_shielded(run_within(CLOSED, asyncio.to_thread(publishing(session).close)))
 
 
 class LoopBridge:

@@ -57,7 +57,7 @@ class ZenohTransport:
 
     in_flight = MANY
     window = WINDOW
-    reorder_window = 0.0
+    reorder_window: float = 0.0
 
     def __init__(self, place: ZenohConfig) -> None:
         self._name = place.name

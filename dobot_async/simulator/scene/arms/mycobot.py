@@ -18,7 +18,7 @@ COLLISION = 16
 class MyCobotInScene:
     """A myCobot; the tip is in front of its flange, wherever that looks."""
 
-    rail = 0.0
+    rail: float = 0.0
     switches = None
     sucks = False
 

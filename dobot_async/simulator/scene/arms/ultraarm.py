@@ -16,7 +16,7 @@ LOST = 0x50  # any code: the arm tells nobody
 class UltraArmInScene:
     """An ultraArm; the tip hangs below what its coordinates tell."""
 
-    rail = 0.0
+    rail: float = 0.0
     switches = None
 
     def __init__(self, arm: SimulatedUltraArm) -> None:
