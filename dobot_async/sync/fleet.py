@@ -26,7 +26,7 @@ from dobot_async.sync.magician import Batch, Magician
 from dobot_async.sync.mycobot import CobotBatch, MyCobot
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.twin import Block, Twin
-from dobot_async.sync.twins import asynchronous_of, blocking_of, twin_of
+from dobot_async.sync.twins import AnyArm, asynchronous_of, blocking_of, twin_of
 from dobot_async.sync.ultraarm import UltraArm, UltraArmBatch
 
 __all__ = ["Fleet", "Member", "Together"]
@@ -36,7 +36,6 @@ B = TypeVar("B")
 K = TypeVar("K")
 T = TypeVar("T")
 P = ParamSpec("P")
-AnyArm = Magician | MyCobot | UltraArm
 
 
 @dataclass(frozen=True)
@@ -178,7 +177,8 @@ class Fleet(Twin[AsyncFleet[Any]], Generic[A]):
         """Returns what the fleet was told of an arm before it was connected."""
         told = self.asynchronous.member(name)
         given: dict[str, Any] = {field.name: getattr(told, field.name) for field in fields(told)}
-        return Member(**{**given, "kind": blocking_of(told.kind)})
+        given["kind"] = blocking_of(told.kind)
+        return Member(**given)
 
     @property
     def zones(self) -> Mapping[str, Shape | None]:
