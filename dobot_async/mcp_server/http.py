@@ -26,6 +26,7 @@ from dobot_async._core.util.hosts import HostAndPort, is_for_us, is_loopback
 from dobot_async._core.util.tasks import cancel_and_join, run_shielded
 from dobot_async.bridge.handshake import Authenticator
 from dobot_async.errors import ConnectFailed
+from dobot_async.mcp_server.deadline import PunctualHTTP
 from dobot_async.mcp_server.server import ArmServer
 from dobot_async.mcp_server.tools import GONE
 from dobot_async.transports.keep_alive import keep_alive
@@ -207,7 +208,7 @@ def config_of(app: ASGIApp, certificate: str | Path | None, key: str | Path | No
     tls: dict[str, Any] = {"ssl_certfile": certificate, "ssl_keyfile": key} if certificate else {}
     return uvicorn.Config(
         app,
-        http="h11",
+        http=PunctualHTTP,
         ws="none",
         lifespan="on",
         log_config=None,

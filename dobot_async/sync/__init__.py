@@ -5,21 +5,27 @@
         motion = arm.queue.move_to(220, 0, 40)
         motion.wait()
 
-What is no class of arms, queues and motions, such as poses, modes and errors, is the same as in `dobot_async`.
+Functions that take an arm, such as `pick`, `draw` and `play`, are here as well, and so is `discover`. What is neither,
+such as poses, toolpaths, modes and errors, is the same as in `dobot_async`.
 """
 
 from importlib import import_module
 from typing import Any
 
 HOMES = {
+    "discovery": ("discover",),
+    "figures": ("figures_of", "read_figures"),
     "fleet": ("Fleet", "Member"),
     "follow": ("Follow",),
+    "handling": ("gripper_holds", "pick", "pick_and_place", "place"),
     "link": ("Link",),
     "magician": ("Magician",),
     "motion": ("Motion",),
     "mycobot": ("MyCobot",),
     "portal": ("run",),
     "simulation": ("Simulation", "simulate"),
+    "teaching": ("Recorder", "check_recording", "play", "released"),
+    "toolpath": ("Drawing", "check_toolpath", "draw", "engrave", "estimate", "reach_of", "reachable"),
     "together": ("Together",),
     "ultraarm": ("UltraArm",),
 }

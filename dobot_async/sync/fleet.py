@@ -26,7 +26,7 @@ from dobot_async.sync.mycobot import CobotBatch, MyCobot
 from dobot_async.sync.portal import PORTAL
 from dobot_async.sync.together import Together
 from dobot_async.sync.twin import BlockingContext, Twin
-from dobot_async.sync.twins import asynchronous_of, blocking_of, twin_of
+from dobot_async.sync.twins import AnyArm, asynchronous_of, blocking_of, twin_of
 from dobot_async.sync.ultraarm import UltraArm, UltraArmBatch
 
 __all__ = ["Fleet", "Member"]
@@ -36,7 +36,6 @@ B = TypeVar("B")
 K = TypeVar("K")
 T = TypeVar("T")
 P = ParamSpec("P")
-AnyArm = Magician | MyCobot | UltraArm
 
 
 @dataclass(frozen=True)

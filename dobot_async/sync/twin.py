@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import AsyncIterable, AsyncIterator, Callable, Iterator
-from contextlib import AbstractAsyncContextManager, AbstractContextManager
+from collections.abc import AsyncIterable, AsyncIterator, Callable, Generator, Iterator
+from contextlib import AbstractAsyncContextManager, AbstractContextManager, closing
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
 from dobot_async.sync.portal import PORTAL
 
-__all__ = ["BlockingContext", "Items", "Twin", "same"]
+__all__ = ["BlockingContext", "Items", "Twin", "held", "same"]
 
 A = TypeVar("A")
 T = TypeVar("T")
@@ -151,3 +151,9 @@ class Items(Iterator[T]):
         close = getattr(self._iterator, "aclose", None)
         if close:
             await close()
+
+
+def held(items: Items[T]) -> Generator[T, None, None]:
+    """Yield items that belong to no block: while they are iterated over, the arms' thread is there."""
+    with PORTAL.held(), closing(items):
+        yield from items

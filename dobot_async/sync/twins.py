@@ -14,7 +14,10 @@ from dobot_async.sync.magician import Batch, Magician
 from dobot_async.sync.mycobot import CobotBatch, MyCobot
 from dobot_async.sync.ultraarm import UltraArm, UltraArmBatch
 
-__all__ = ["asynchronous_of", "blocking_of", "twin_of"]
+__all__ = ["AnyArm", "asynchronous_of", "blocking_of", "twin_of"]
+
+AnyArm = Magician | MyCobot | UltraArm
+"""A blocking arm of any family."""
 
 TWINS: dict[type[Any], type[Any]] = {
     AsyncMagician: Magician,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import pytest
@@ -13,7 +13,7 @@ from mcp import Client
 from mcp_rig import FAR, IN_TIME, Rig, called, moves, rig, stands, started
 
 from dobot_async.errors import ConnectFailed
-from dobot_async.mcp_server import serve_http
+from dobot_async.mcp_server import deadline, serve_http
 
 LEGACY, MODERN = "2025-06-18", "2026-07-28"
 INITIALIZE = {
@@ -200,6 +200,46 @@ async def test_garbage_is_refused_and_the_next_request_is_right(body: bytes) -> 
         assert 400 <= await status(port, {}, body) < 500
         assert await status(port) == 200
         assert not r.sim.arm.executed
+
+
+@pytest.mark.parametrize("begun", ["", "POST /mcp HT", "POST /mcp HTTP/1.1\r\nHost: {host}\r\nX-Slow: ", "{whole}"])
+async def test_who_does_not_say_what_he_wants_holds_no_place(begun: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(deadline, "WHOLE", 0.3)
+    async with served() as (r, port):
+        whole = f"POST /mcp HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: 9\r\n\r\n{{"
+        several = [await asyncio.open_connection("127.0.0.1", port) for _ in range(10)]
+        for _, writer in several:
+            writer.write(begun.format(host=f"127.0.0.1:{port}", whole=whole).encode())
+
+        async with asyncio.timeout(IN_TIME):
+            for reader, writer in several:
+                with suppress(ConnectionError):
+                    await reader.read()
+
+                writer.transport.abort()
+
+        assert await status(port) == 200
+        assert not r.sim.arm.executed
+
+
+async def test_an_answer_has_no_deadline_nor_a_request_that_comes_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(deadline, "WHOLE", 0.5)
+    async with served(speed=1.0) as (r, port), Client(f"http://127.0.0.1:{port}/mcp") as client:
+        begun = asyncio.get_running_loop().time()
+        assert not (await client.call_tool("move", FAR)).is_error
+        assert asyncio.get_running_loop().time() - begun > 0.5
+        assert moves(r.sim)
+        body = json.dumps(INITIALIZE).encode()
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        head_sent = f"POST /mcp HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Type: application/json\r\n"
+        head_sent += f"Accept: application/json, text/event-stream\r\nContent-Length: {len(body)}\r\n\r\n"
+        for part in (head_sent[:20].encode(), head_sent[20:].encode(), body[:10], body[10:]):
+            writer.write(part)
+            await writer.drain()
+            await asyncio.sleep(0)
+
+        assert (await head(reader))[0] == 200
+        writer.transport.abort()
 
 
 async def test_sessions_are_bounded() -> None:

@@ -307,12 +307,16 @@ async def test_anybody_stops_the_arm_and_that_ends_the_lease() -> None:
 
 async def test_a_broker_that_is_lost_stops_the_arm_and_comes_back() -> None:
     async with hall() as broker, simulate("magician", speed=1) as sim, running(broker.port, sim) as gateway:
-        async with ear(broker.port) as heard:
-            await heard.do("one", do="take_lease", seconds=60)
-            await heard.say({"session": "one", "id": "far", **FAR})
-            await started(sim)
-            await broker.off()
+        off = False
+        with suppress(aiomqtt.MqttError):  # before aiomqtt 2.5 the listener's own end tells that the broker is gone
+            async with ear(broker.port) as heard:
+                await heard.do("one", do="take_lease", seconds=60)
+                await heard.say({"session": "one", "id": "far", **FAR})
+                await started(sim)
+                await broker.off()
+                off = True
 
+        assert off
         await stands(sim)
         assert gateway.holders == {"arm": None}
         await broker.on()

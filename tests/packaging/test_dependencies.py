@@ -57,8 +57,10 @@ def third_party() -> dict[str, set[str]]:
     for path in sorted(PACKAGE.rglob("*.py")):
         for name in imported(path):
             if name not in sys.stdlib_module_names and name not in {"__future__", "dobot_async"}:
-                for each in known.get(name, [name]):
-                    found.setdefault(normalized(each), set()).add(str(path.relative_to(PACKAGE)))
+                candidates = {normalized(each) for each in known.get(name, [name])}
+                declared = CORE.union(*OPTIONAL.values()) & candidates  # several distributions may share a name
+                for each in declared or candidates:
+                    found.setdefault(each, set()).add(str(path.relative_to(PACKAGE)))
 
     return found
 

@@ -21,7 +21,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no SIGHUP, and 
 
 HEAD = """
 import os, signal, sys, threading, time
-from dobot_async.sync import Magician
+from dobot_async.sync import Drawing, Magician, Recorder, discover, draw, pick, play
+from dobot_async.toolpath import Stroke, Toolpath, WorkPlane
 
 url = sys.argv[1]
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -97,6 +98,70 @@ async def test_a_signal_stops_the_arm_and_ends_the_program(name: str, body: str)
         else:
             assert code == 128 + getattr(signal, name)
             assert "Traceback" not in said
+
+
+PICKING = "pick(arm, (260, 150, 0), tool='suction')"
+PICKING_BY_HAND = "pick(arm, (260, 150, 0), tool=lambda take: arm.move_to(200, -150, 40))"
+DRAWING = "draw(arm, Toolpath([Stroke([(0, 0), (40, 60)])]), WorkPlane.flat(220, 0, 0), speed=5)"
+PLAYING = (
+    "recorder = Recorder(arm); recorder.point(); arm.move_by(y=1); recorder.point(); "
+    "play(arm, recorder.recording, loops=None)"
+)
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("call", [PICKING, PICKING_BY_HAND, DRAWING, PLAYING], ids=["pick", "own tool", "draw", "play"])
+async def test_a_signal_in_a_function_stops_the_arm_and_ends_the_program(name: str, call: str) -> None:
+    body = f"""
+        with Magician.connect(url) as arm:
+            threading.Thread(target=moving, args=(arm,), daemon=True).start()
+            {call}
+    """
+    async with program(body) as (sim, process):
+        process.send_signal(getattr(signal, name))
+        code, said = await ended(process)
+        assert sim.arm.device.idle
+        assert not sim.arm.suction or "suction" in call
+        assert code in {-signal.SIGINT, 1, 130} if name == "SIGINT" else code == 128 + signal.SIGTERM, said
+        assert "KeyboardInterrupt" in said if name == "SIGINT" else "Traceback" not in said
+
+
+async def test_a_tool_that_fails_ends_the_program_and_stops_the_arm() -> None:
+    body = """
+        def tool(take):
+            arm.queue.move_to(200, -150, 40)
+            moving(arm)
+            raise ZeroDivisionError("mine")
+
+        with Magician.connect(url) as arm:
+            pick(arm, (220, 0, 0), tool=tool)
+    """
+    async with program(body) as (sim, process):
+        code, said = await ended(process)
+        assert code == 1
+        assert said.rstrip().endswith("ZeroDivisionError: mine")
+        assert sim.arm.device.idle
+        assert [each.outcome for each in sim.arm.executed if each.name == "SetPTPCmd"] == ["done", "done", "aborted"]
+
+
+async def test_a_search_that_was_begun_and_forgotten_holds_up_no_end() -> None:
+    body = """
+        with Magician.connect(url) as arm:
+            arm.queue.move_to(260, 150, 40)
+            moving(arm)
+
+        searching = discover(sources=["serial"], timeout=0)
+        print(list(searching), next(discover(sources=["serial"], timeout=0), None))
+        begun = discover(sources=["serial", "wifi"], timeout=60)
+        threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        next(begun)
+    """
+    async with program(body) as (_, process):
+        code, said = await ended(process)
+        assert code in {-signal.SIGINT, 1, 130}
+        assert said.rstrip().endswith("KeyboardInterrupt")
+        assert "never awaited" not in said
+        assert "ignored" not in said
 
 
 async def test_an_exception_stops_the_arm() -> None:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import inspect
+import pkgutil
 import re
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -129,11 +132,90 @@ def test_a_member_returns_what_the_other_one_gives_when_it_is_awaited(
 @each_member
 def test_a_member_says_the_same_in_words_without_await(kind: type[Any], twin: type[Any], name: str) -> None:
     said = inspect.getdoc(getattr(twin, name))
-    original = inspect.getdoc(getattr(kind, name)) or ""
+    member = inspect.getattr_static(kind, name)  # the value of an attribute has words of its own, even if it is None
+    original = (inspect.getdoc(member) or "") if isinstance(member, property) or callable(getattr(kind, name)) else ""
     assert said
     assert "await " not in said
     assert "async " not in said
     assert not original or said.split()[0] == original.split()[0]
+
+
+each_function = pytest.mark.parametrize(
+    ("page", "name", "original"), [pytest.param(*each, id=each[1]) for each in write_sync.functions()]
+)
+NO_TWIN = {
+    # The wire is for the driver, and a base class or a strategy for those who write one.
+    "open_transport": "the wire",
+    "Arm": "a protocol: its verbs are those of each blocking arm",
+    **dict.fromkeys(("DiscoverySource", "Transport"), "a protocol: written for the driver's own loop"),
+    "Strategy": "a protocol: written for the driver's own loop",
+    "follow_target": "arm.following",
+    # Who serves others is a program of its own: there is a command for each, and `run` awaits anything.
+    **dict.fromkeys(("Bridge", "bridge", "figures_of_bridge"), "dobot-async bridge"),
+    **dict.fromkeys(("ArmServer", "serve_http", "serve_stdio"), "dobot-async mcp"),
+    **dict.fromkeys(("Action", "Draw", "Grip", "Home", "Move", "Pick", "Place", "Recover"), "dobot-async mcp, mqtt"),
+    **dict.fromkeys(("Works", "open_site", "state_told"), "dobot-async mcp, mqtt"),
+    "Gateway": "dobot-async mqtt",
+    "serve_metrics": "dobot-async bridge, mqtt: --metrics",
+    "announced": "dobot-async simulate --announce",
+}
+"""What is awaited and public, and has no blocking twin: why."""
+
+
+def awaited_and_public() -> Iterator[tuple[str, str]]:
+    """The package and the name of each public function and class of which something is awaited."""
+    without = {"cli", "compat", "panel", "sync", "testing"}
+    names = [found.name for found in pkgutil.iter_modules(dobot_async.__path__) if found.name not in without]
+    modules = [import_module(f"dobot_async.{name}") for name in names if not name.startswith("_")]
+    for package in (dobot_async, *modules):
+        for name in getattr(package, "__all__", ()):
+            if is_awaited(getattr(package, name)):
+                yield package.__name__, name
+
+
+def is_awaited(value: Any) -> bool:
+    """Whether a function, or one that a class has itself, is to be awaited, or entered or iterated over so."""
+    if inspect.isclass(value):
+        return any(
+            is_awaited(each) for name, each in vars(value).items() if name[0] != "_" and inspect.isfunction(each)
+        )
+
+    returned = str(getattr(value, "__annotations__", {}).get("return", "")) if inspect.isfunction(value) else ""
+    return (
+        inspect.iscoroutinefunction(value) or re.match("Async|AbstractAsync|Coroutine|Awaitable", returned) is not None
+    )
+
+
+@pytest.mark.parametrize(("package", "name"), list(awaited_and_public()))
+def test_whatever_is_awaited_has_a_blocking_twin(package: str, name: str) -> None:
+    assert (name in sync.__all__) is (name not in NO_TWIN), package
+
+
+def test_who_has_no_twin_is_still_there() -> None:
+    assert NO_TWIN.keys() <= {name for _, name in awaited_and_public()}
+
+
+@each_function
+def test_a_function_has_the_same_arguments_and_defaults(page: ModuleType, name: str, original: Any) -> None:
+    function = getattr(sync, name)
+    assert function is getattr(page, name)
+    assert parameters(function) == parameters(original)
+    assert not inspect.iscoroutinefunction(function)
+    assert not inspect.isasyncgenfunction(function)
+
+
+@each_function
+def test_a_function_says_the_same_in_words_without_await(page: ModuleType, name: str, original: Any) -> None:
+    said, first = inspect.getdoc(getattr(page, name)) or "", (inspect.getdoc(original) or "").splitlines()[0]
+    assert said.splitlines()[0] == first
+    assert "await " not in said
+    assert "async " not in said
+    assert "cancelled" not in said
+
+
+@pytest.mark.parametrize("twin", [twin for _, twin in write_sync.pages() if twin.made], ids=lambda twin: twin.called)
+def test_what_users_make_is_made_of_the_same(twin: write_sync.Twin) -> None:
+    assert parameters(getattr(sync, twin.called)) == parameters(twin.kind)
 
 
 @pytest.mark.parametrize("kind", [magician.Magician, mycobot.MyCobot, ultraarm.UltraArm, fleet.Fleet])

@@ -5,7 +5,9 @@
         async context manager of R         def f(...) -> AbstractContextManager[R]      a block
         async generator of R               def f(...) -> Iterator[R]                    for `for`
         def f(...) -> R, property          the same                                     looked at in the arms' thread
-    docstrings, names, defaults and types stay; a class that has a blocking twin itself is replaced by that.
+    function of the driver --> the same, but that one which only looks what arm it is runs in the thread of who calls it
+    docstrings, names, defaults and types stay; a class that has a blocking twin itself is replaced by that, and what is
+    given to a function (an arm, a tool, a check) is what programs without asyncio have of it.
 
 A test compares what this writes with what is in the repository.
 """
@@ -19,11 +21,11 @@ import re
 import subprocess
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, TypeVar
 
 ROOT = Path(__file__).parents[2]
@@ -58,6 +60,7 @@ class Twin:
         about: What the class is, where the asynchronous one says it in words that do not fit.
         omit: What is written by hand, or is not there.
         base: What is written by hand of it.
+        made: Users make it themselves, of what the asynchronous one is made of.
     """
 
     of: str
@@ -70,6 +73,7 @@ class Twin:
     about: str = ""
     omit: tuple[str, ...] = ()
     base: str = ""
+    made: bool = False
 
     @property
     def kind(self) -> type[Any]:
@@ -94,8 +98,36 @@ class Page:
     """A module to be written."""
 
     about: str
-    twins: Sequence[Twin]
+    twins: Sequence[Twin] = ()
+    functions: Sequence[str] = ()
 
+
+@dataclass(frozen=True)
+class Given:
+    """What a function is given, in the words of programs without asyncio.
+
+    Attributes:
+        called: Its type, "module:name" of the blocking package; "" for the one that it has.
+        taken: What makes the asynchronous one of it.
+        told: What makes it of an asynchronous one that is returned.
+    """
+
+    called: str
+    taken: str
+    told: str = ""
+
+
+GIVEN = {
+    "dobot_async.arms.base:Arm": Given("twins:AnyArm", "given:arm_of"),
+    "dobot_async.toolpath.drawing:DrawingArm": Given("twins:AnyArm", "given:arm_of"),
+    "dobot_async:MyCobot": Given("mycobot:MyCobot", "given:arm_of"),
+    "dobot_async.handling.pick_and_place:Tool": Given("given:Tool", "given:tool_of"),
+    "dobot_async.handling.arms:Check": Given("given:Check", "given:check_of", "given:blocking"),
+}
+"""By the type that the asynchronous function says."""
+
+LIKE_AN_ARM = Given("", "given:like_an_arm")
+"""An `arm` that may be something else as well, such as the name of a model."""
 
 ARM = {"link": "Link"}
 WRITTEN = ("stream",)
@@ -186,6 +218,36 @@ PAGES: dict[str, Page] = {
             ),
         ),
     ),
+    "handling": Page(
+        "Pick and place, for programs without asyncio.",
+        functions=[f"dobot_async.handling:{name}" for name in ("gripper_holds", "pick", "pick_and_place", "place")],
+    ),
+    "toolpath": Page(
+        "Drawing and engraving, for programs without asyncio.",
+        (Twin("dobot_async.toolpath:Drawing", made=True),),
+        (
+            "dobot_async.toolpath:draw",
+            "dobot_async.toolpath:engrave",
+            "dobot_async.toolpath:estimate",
+            "dobot_async.toolpath:check_toolpath",
+            "dobot_async.toolpath:reach_of",
+            "dobot_async.toolpath:reachable",
+        ),
+    ),
+    "teaching": Page(
+        "Teaching and playing back, for programs without asyncio.",
+        (Twin("dobot_async.teaching:Recorder", reads={"arm": "twins:AnyArm"}, made=True),),
+        (
+            "dobot_async.teaching:check_recording",
+            "dobot_async.teaching:play",
+            "dobot_async.teaching:released",
+        ),
+    ),
+    "discovery": Page("Search for arms, for programs without asyncio.", functions=("dobot_async.discovery:discover",)),
+    "figures": Page(
+        "Figures of arms, for programs without asyncio.",
+        functions=("dobot_async.metrics:figures_of", "dobot_async.metrics:read_figures"),
+    ),
 }
 BY_HAND = {
     "dobot_async:Link": ("link", "Link"),
@@ -202,6 +264,13 @@ def homes() -> dict[type[Any], tuple[str, str]]:
 def twin_homes() -> dict[str, str]:
     """The module of each twin, by its name."""
     return {name: page for page, name in homes().values()}
+
+
+def functions() -> Iterator[tuple[ModuleType, str, Any]]:
+    """Each function that is written, with the module that it is in, and the asynchronous one."""
+    for name, page in PAGES.items():
+        for path in page.functions:
+            yield import_module(f"{PACKAGE}.{name}"), path.partition(":")[2], found(path)
 
 
 def pages() -> Iterator[tuple[ModuleType, Twin]]:
@@ -228,6 +297,12 @@ class Source:
         (node,) = [each for each in self.tree.body if isinstance(each, ast.ClassDef) and each.name == kind.__name__]
         return node
 
+    def function(self, name: str) -> ast.FunctionDef | ast.AsyncFunctionDef:
+        """The source of a function."""
+        kinds = (ast.FunctionDef, ast.AsyncFunctionDef)
+        (node,) = [each for each in self.tree.body if isinstance(each, kinds) and each.name == name]
+        return node
+
 
 class Writer:
     """Writes one module."""
@@ -243,7 +318,8 @@ class Writer:
         """The text of the module."""
         about = PAGES[self.page]
         classes = [self.twin(twin) for twin in about.twins]
-        names = sorted(twin.called for twin in about.twins)
+        classes += [self.function(path) for path in about.functions]
+        names = sorted([twin.called for twin in about.twins] + [path.partition(":")[2] for path in about.functions])
         lines = [
             f'"""{about.about}',
             "",
@@ -293,24 +369,27 @@ class Writer:
         about, attributes = parted(inspect.getdoc(kind) or "")
         lines = [f"class {twin.called}({', '.join(bases)}):", self.docstring(twin.about or about)]
         if twin.copies:
-            lines += ["", f"    def __init__(self, asynchronous: {original}) -> None:"]
-            lines += ["        super().__init__(asynchronous)"]
-            for name in twin.copies:
-                holder = next(each for each in kind.__mro__ if name in inspect.get_annotations(each))
-                of = self.need(holder.__module__, inspect.get_annotations(holder)[name])
-                lines += [f"        self.{name}: {of} = asynchronous.{name}"]
+            lines += ["", *self.copies(twin, original)]
+
+        if twin.made:
+            lines += ["", *self.constructor(kind, original)]
 
         for name, of in (twin.members | twin.reads).items():
-            value = of
+            value, wrap = of, ""
             if name in twin.members:
-                value = self.sync(twin_homes()[of], of)
+                value = wrap = self.sync(twin_homes()[of], of)
+            elif ":" in of:  # whichever family's
+                value, wrap = self.sync(*of.split(":")), self.sync("twins", "twin_of")
             else:
                 self.expression(ast.parse(of, mode="eval").body, self.source(kind.__module__))
 
             read = f"self.asynchronous.{name}"
             lines += ["", "    @property", f"    def {name}(self) -> {value}:"]
             lines += [self.docstring(attributes[name], "        ")]
-            lines += [f"        return {f'{value}({read})' if name in twin.members else read}"]
+            if ":" in of:
+                lines += [f"        found: {value} = {wrap}({read})", "        return found"]
+            else:
+                lines += [f"        return {f'{wrap}({read})' if wrap else read}"]
 
         for node, source in self.members(twin):
             lines += ["", *self.member(node, source, f"self.asynchronous.{node.name}", original, twin)]
@@ -323,6 +402,71 @@ class Writer:
             lines += ["", *self.member(called, source, f"self.asynchronous.{name}", original, twin, name)]
 
         return "\n".join([*lines, "", ""])
+
+    def copies(self, twin: Twin, original: str) -> list[str]:
+        """The lines that take over attributes."""
+        lines = [f"    def __init__(self, asynchronous: {original}) -> None:", "        super().__init__(asynchronous)"]
+        for name in twin.copies:
+            holder = next(each for each in twin.kind.__mro__ if name in inspect.get_annotations(each))
+            of = self.need(holder.__module__, inspect.get_annotations(holder)[name])
+            lines += [f"        self.{name}: {of} = asynchronous.{name}"]
+
+        return lines
+
+    def constructor(self, kind: type[Any], original: str) -> list[str]:
+        """The lines of what users make one by."""
+        source = self.source(kind.__module__)
+        (node,) = [each for each in source.body(kind).body if getattr(each, "name", "") == "__init__"]
+        assert isinstance(node, ast.FunctionDef)
+        doc, call = (
+            self.docstring(ast.get_docstring(node) or "", "        "),
+            f"{original}({self.given(node.args, source)})",
+        )
+        return [
+            f"    def __init__({self.arguments(node.args, source)}) -> None:",
+            *([doc] if doc else []),
+            f"        super().__init__({call})",
+        ]
+
+    def function(self, path: str) -> str:
+        """The text of a function."""
+        module, _, name = path.partition(":")
+        source = self.source(found(path).__module__)
+        node = source.function(name)
+        target = self.need(module, name, f"async_{name}")
+        given = self.given(node.args, source)
+        words = {ast.unparse(each) for each in node.decorator_list}
+        kind, inner = self.kind_of(node, words)
+        text, body = self.returned(node, source, words, False, target, given, False)
+        if kind == "look" and LIKE_AN_ARM.taken.partition(":")[2] in given:  # it asks no arm, and may take a while
+            body = [f"        {'' if text == 'None' else 'return '}{target}({given})"]
+        elif kind == "items":  # nothing else may be open meanwhile
+            body = [line.replace("return Items(", f"return {self.sync('twin', 'held')}(Items(") + ")" for line in body]
+            text = f"{self.need('collections.abc', 'Generator')}[{self.type_of(inner, source)[0]}, None, None]"
+
+        doc = self.docstring(ast.get_docstring(node) or "", "        ")
+        return textwrap.dedent(
+            "\n".join([f"    def {name}({self.arguments(node.args, source)}) -> {text}:", doc, *body, "", ""])
+        )
+
+    def given(self, node: ast.arguments, source: Source) -> str:
+        """The arguments of a call that hands all on, as the asynchronous function takes them."""
+        taken = {}
+        for each in (*node.posonlyargs, *node.args, *node.kwonlyargs):
+            given = self.given_as(each.annotation, source) or (LIKE_AN_ARM if each.arg == "arm" else None)
+            if given:
+                taken[each.arg] = self.sync(*given.taken.split(":"))
+
+        return call_of(node, taken)
+
+    @staticmethod
+    def given_as(node: ast.expr | None, source: Source) -> Given | None:
+        """What programs without asyncio have instead of something of this type, which may be None."""
+        while isinstance(node, ast.BinOp):
+            node = node.left
+
+        value = getattr(source.module, node.id, None) if isinstance(node, ast.Name) else None
+        return next((given for path, given in GIVEN.items() if value is not None and found(path) is value), None)
 
     def base(self, twin: Twin, original: str) -> str:
         """The class that holds the asynchronous object."""
@@ -409,7 +553,8 @@ class Writer:
 
         if kind == "items":
             items = self.sync("twin", "Items")
-            return f"{items}[{text}]", [f"        return {items}(lambda: {call}, {wrap or self.sync('twin', 'same')})"]
+            make = call.removesuffix("()") if call.endswith("()") else f"lambda: {call}"
+            return f"{items}[{text}]", [f"        return {items}({make}, {wrap or self.sync('twin', 'same')})"]
 
         verb = "run" if kind == "wait" else "look"
         value = f"{portal}.{verb}({call.removesuffix('()') if call.endswith('()') else f'lambda: {call}'})"
@@ -445,6 +590,12 @@ class Writer:
             if isinstance(kind, type) and kind in self.homes:
                 name = self.sync(*self.homes[kind])
                 return name, name
+
+        given = self.given_as(node, source)
+        if given:
+            name = self.sync(*given.called.split(":"))
+            text = ast.unparse(node)
+            return name + text[text.find(" ") :] * (" " in text), given.told and self.sync(*given.told.split(":"))
 
         if ast.unparse(node) == "list[Motion]":
             name = self.sync("motion", "Motion")
@@ -542,6 +693,8 @@ WORDS = (
     ),
     (r"awaiting it returns at once", "`wait` returns at once"),
     (r"arm\.run_gcode\(\"part.gcode\"\)", 'arm.run_gcode("part.gcode").wait()'),
+    (r": a function, async or not\.", ": a function."),
+    (r"None until it is cancelled", "None until it is interrupted"),
     (r"; made by `MyCobot\.connect`", "; made by `connect`"),
 )
 
@@ -553,11 +706,15 @@ def parted(text: str) -> tuple[str, dict[str, str]]:
     return about, {name: " ".join(said.split()) for name, said in attributes}
 
 
-def call_of(node: ast.arguments) -> str:
-    """The arguments of a call that hands all on."""
-    found = [each.arg for each in (*node.posonlyargs, *node.args) if each.arg not in {"self", "cls"}]
+def call_of(node: ast.arguments, taken: Mapping[str, str] = MappingProxyType({})) -> str:
+    """The arguments of a call that hands all on; by name, what makes the one that is taken of the one that is given."""
+
+    def value(name: str) -> str:
+        return f"{taken[name]}({name})" if name in taken else name
+
+    found = [value(each.arg) for each in (*node.posonlyargs, *node.args) if each.arg not in {"self", "cls"}]
     found += [f"*{node.vararg.arg}"] if node.vararg else []
-    found += [f"{each.arg}={each.arg}" for each in node.kwonlyargs if each.arg not in HIDDEN]
+    found += [f"{each.arg}={value(each.arg)}" for each in node.kwonlyargs if each.arg not in HIDDEN]
     found += [f"**{node.kwarg.arg}"] if node.kwarg else []
     return ", ".join(found)
 

@@ -13,8 +13,10 @@ import asyncio
 import json
 import sys
 import time
-from contextlib import aclosing
+from contextlib import aclosing, suppress
 from typing import Any
+
+import anyio
 
 from dobot_async._core.link.link import Link
 from dobot_async.arms.magician import commands as c
@@ -57,7 +59,8 @@ async def watch(what: str, transport: Any, down: asyncio.Event, pause: float | N
         begun = time.monotonic()
         if pause is not None:
             await asyncio.sleep(pause)
-            await transport.send(b"lost")
+            with suppress(anyio.BrokenResourceError):  # on a busy machine it is found to be dead before
+                await transport.send(b"lost")
 
         await asyncio.wait([receiving])
         tell(what, begun, receiving.exception())
