@@ -18,6 +18,7 @@ from contextlib import asynccontextmanager
 from typing import Literal, TypeVar
 
 from dobot_async._core.queue.motion import Motion
+from dobot_async._core.util.bounds import Bounds
 from dobot_async.fleet.claims import ZoneHolder, ZoneRequest
 from dobot_async.fleet.course import PlannedCourse, PlannedStep, shifted
 from dobot_async.fleet.frames import BaseFrame
@@ -173,6 +174,11 @@ class Guard(Whereabouts[S]):
         why = await self._limits.watch(self._planner.tool)
         await halt()
         return why
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """The limits, for who sends the arm about without its queue; None if there are none."""
+        return self._limits if self.is_limited else None
 
     @property
     def is_limited(self) -> bool:

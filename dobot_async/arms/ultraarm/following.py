@@ -8,7 +8,7 @@ over within a moment: then the arm rests soon after the end, and no stop has to 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from typing import Any, SupportsFloat
 
@@ -21,7 +21,7 @@ from dobot_async.arms.ultraarm.runner import UltraArmRunner
 from dobot_async.arms.ultraarm.status import STATUS_AND_ANGLES
 from dobot_async.errors import CommandRejected, MotionUnknown
 from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, FollowStatus, TargetPoint, follow_target
-from dobot_async.following.points import apart, part_of_way
+from dobot_async.following.points import apart, part_of_way, straight_way
 
 __all__ = ["UltraArmFollowing"]
 
@@ -110,6 +110,10 @@ class Led:
     def allow(self, point: TargetPoint) -> None:
         """Raise ValueError for a place that is beyond the limits."""
         self._runner.limits.check(command(point, None)[1])
+
+    def way(self, start: TargetPoint, end: TargetPoint) -> Sequence[tuple[float, ...]]:
+        """Return the ends of the way."""
+        return straight_way(start, end)
 
     async def begin(self) -> None:
         """Let coordinates be places; raise CommandRejected if the arm cannot move."""
