@@ -25,6 +25,7 @@ from dobot_async.arms.magician.arm import Magician
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, another
+from dobot_async.toolpath.joints import check_joints
 from dobot_async.toolpath.moves import Move, Tool, approach, check_moves, from_point
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.position import Sent, StrokePosition, along, stand_of
@@ -44,7 +45,7 @@ from dobot_async.toolpath.schedule import (
 )
 from dobot_async.toolpath.toolpath import Toolpath
 
-__all__ = ["Drawing", "DrawingArm", "draw", "engrave"]
+__all__ = ["Drawing", "DrawingArm"]
 
 DrawingArm = Magician | UltraArm | MyCobot
 LOOK = 0.5  # seconds between two questions how far the arm is, while commands are sent: each takes the line for a while
@@ -68,7 +69,7 @@ class Drawing:
         progress: Called with a `Progress` when something was done.
 
     Raises:
-        UnreachableStroke: The arm cannot go there; it names stroke, point and reason.
+        UnreachableStroke: The arm cannot go there, or not in its workspace; it names stroke, point and reason.
         UnsupportedError: The arm has no such tool.
         ValueError: A number is out of range, or there is nothing to draw.
     """
@@ -100,7 +101,7 @@ class Drawing:
         self._strokes = planned(path, plane, tool, speed, rate if isinstance(arm, Magician) else None)
         lengths, guesses = [stroke.length for stroke in path], [guess(moves) for moves in self._strokes]
         self._meter = ProgressMeter(lengths, guesses, progress)
-        check_moves((move for moves in self._strokes for move in moves), self._reach)
+        check_moves((move for moves in self._strokes for move in moves), self._reach, bounds=arm.queue.bounds)
         self._running: asyncio.Task[Any] | None = None
         self._stopped = False
         self._epoch = Epoch()
@@ -132,7 +133,8 @@ class Drawing:
             point: Of a laser: how far in this stroke, as `next_point` of the same toolpath with the same tolerance.
 
         Raises:
-            UnreachableStroke: The way from where the arm is to the first stroke is out of reach; nothing was sent.
+            UnreachableStroke: The way from where the arm is to the first stroke is out of reach, or from there a limit
+                of a myCobot's joints is in the way of a stroke; nothing has moved.
             DobotError: As `arm.queue.put` and `Motion.wait`, with a note that tells the stroke. The arm was stopped.
             RuntimeError: It is being drawn already.
         """
@@ -150,7 +152,10 @@ class Drawing:
         try:
             here, program = await program_for(self._arm, self._tool, self._pace)
             moves = self._moves(here)
-            check_moves(moves, self._reach, here)
+            check_moves(moves, self._reach, here, self._arm.queue.bounds)
+            if isinstance(self._arm, MyCobot):
+                await check_joints(self._arm, moves, here)
+
             await self._draw(list(program.instructions(moves)), here)
         finally:
             self._running = None
@@ -266,33 +271,3 @@ class Drawing:
         before = self.next_stroke
         self._position = position if self._tool == "laser" else StrokePosition(position.stroke)
         self._meter.reached(before, self.next_stroke, asyncio.get_running_loop().time())
-
-
-async def draw(arm: DrawingArm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:
-    """Draw a toolpath with a pen, and return when the arm has done it; see `Drawing`, which can be stopped.
-
-    Args:
-        arm: A connected Magician, UltraArm or MyCobot.
-        toolpath: What to draw.
-        plane: Where the paper lies.
-        first: The stroke, from 0, to begin with.
-        options: As for `Drawing`: speed, tolerance, acceleration, percent, rate, progress.
-    """
-    await Drawing(arm, toolpath, plane, tool="pen", **options).run(first=first)
-
-
-async def engrave(
-    arm: DrawingArm,
-    toolpath: Toolpath,
-    plane: WorkPlane,
-    *,
-    first: int = 0,
-    point: SupportsFloat = 0.0,
-    **options: Any,
-) -> None:
-    """Engrave a toolpath with a laser, which is off on every way out; see `draw`.
-
-    The plane is that of the focus: the laser is moved in it, and lifted on the way to the first stroke alone. A dot is
-    a line of 0.1 mm. With `first` and `point` it goes on where it was stopped.
-    """
-    await Drawing(arm, toolpath, plane, tool="laser", **options).run(first=first, point=point)
