@@ -29,7 +29,7 @@ from dobot_async.toolpath.joints import check_joints
 from dobot_async.toolpath.moves import Move, Tool, approach, check_moves, from_point
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.position import Sent, StrokePosition, along, stand_of
-from dobot_async.toolpath.programs import DrawingPace, Instruction, check_tool, program_for
+from dobot_async.toolpath.programs import DrawingPace, Instruction, back_to_ramps, check_tool, program_for
 from dobot_async.toolpath.progress import Progress, ProgressMeter
 from dobot_async.toolpath.reach import reach_of
 from dobot_async.toolpath.schedule import (
@@ -64,6 +64,8 @@ class Drawing:
         tolerance: mm by which points that are left out may be missed; 0 leaves none out.
         acceleration: Of a Magician's continuous path, mm/s².
         percent: Of a myCobot's speed.
+        constant_speed: Of an ultraArm: run without ramps (M16 S0), as the vendor's player runs programs, and go back to
+            ramps behind it. What that does to its motions nobody has measured.
         rate: Commands per second that the line carries; where many short ways follow one another the speed of a
             Magician is made so low that the arm does not use up its queue. None does not look.
         progress: Called with a `Progress` when something was done.
@@ -85,6 +87,7 @@ class Drawing:
         tolerance: SupportsFloat = TOLERANCE,
         acceleration: SupportsFloat = 100.0,
         percent: int = 20,
+        constant_speed: bool = False,
         rate: SupportsFloat | None = RATE,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
@@ -92,11 +95,14 @@ class Drawing:
         if speed is not None and isinstance(arm, MyCobot):
             raise ValueError("a myCobot knows no speed in mm/s: give percent= (1 to 100) instead")
 
+        if constant_speed and not isinstance(arm, UltraArm):
+            raise ValueError("constant_speed is for an ultraArm alone: others have no such mode")
+
         self._arm = arm
         self._plane = plane
         self._tool = tool
         self._reach = reach_of(arm)
-        self._pace = DrawingPace(above_zero(acceleration, "acceleration"), whole_percent(percent))
+        self._pace = DrawingPace(above_zero(acceleration, "acceleration"), whole_percent(percent), bool(constant_speed))
         path = simplified(toolpath, tolerance)
         self._strokes = planned(path, plane, tool, speed, rate if isinstance(arm, Magician) else None)
         lengths, guesses = [stroke.length for stroke in path], [guess(moves) for moves in self._strokes]
@@ -206,6 +212,9 @@ class Drawing:
             await cleanup.finish(
                 cleanup.start(self._locate(pending, deadline), "the search where a drawing was stopped")
             )
+
+        if self._pace.constant_speed:
+            cleanup.start(back_to_ramps(self._arm), "going back to ramps")
 
         error.add_note(self._note())
         if failure:
