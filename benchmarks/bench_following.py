@@ -10,20 +10,25 @@ how far the arm is from the circle. "queued" gives each target to the arm's queu
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 import sys
 from argparse import ArgumentParser
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import SplitResult
 
 import async_solipsism
-import bench_lateness
-from report import Row, percentile, show
 
-from dobot_async import Magician, MyCobot, UltraArm
+from dobot_async import Box, Magician, MyCobot, UltraArm
+from dobot_async._core.protocol.transport import Transport
 from dobot_async.simulator import UltraArmQuirks, simulate
+from dobot_async.transports import SCHEMES, open_transport
 
+Row = dict[str, Any]
+BAUD, BITS = 115_200, 10  # of a byte on the line, start and stop included
 RADIUS, HERTZ, RATE = 30.0, 0.5, 30.0  # mm, rounds a second, targets a second
 UNDER_WAY = 0.3  # of the time, after which it is looked at
 ROUNDS = 10
@@ -40,6 +45,7 @@ class Kind:
         options: What `following` takes; None queues each target.
         details: What `simulate` takes.
         percent: Of a Magician's speeds and accelerations.
+        connect: What `connect` takes.
     """
 
     model: str
@@ -48,6 +54,7 @@ class Kind:
     options: dict[str, Any] | None = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
     percent: float = 100
+    connect: dict[str, Any] = field(default_factory=dict)
 
 
 MAGICIAN = "magician", Magician, (0.0, 30.0, 40.0, 0.0, 0.0)
@@ -58,13 +65,77 @@ KINDS = {
     "Magician": Kind(*MAGICIAN, details=HOMED),
     "Magician, 50 %": Kind(*MAGICIAN, details=HOMED, percent=50),
     "Magician, clear": Kind(*MAGICIAN, {"way": "clear"}, HOMED),
+    "Magician, workspace": Kind(
+        *MAGICIAN, details=HOMED, connect={"workspace": Box((150, 330), (-90, 90), (-50, 150))}
+    ),
     "Magician, queued": Kind(*MAGICIAN, None, HOMED),
     "myCobot 280": Kind(*COBOT),
     "ultraArm, no ramps": Kind(
         *ULTRAARM, {"constant_speed": True}, {**HOMED, "quirks": UltraArmQuirks(constant_speed=True)}
     ),
     "ultraArm, ramps": Kind(*ULTRAARM, details=HOMED),
+    "ultraArm, ramps, 0.5 s": Kind(*ULTRAARM, {"motion_time": 0.5}, HOMED),
 }
+
+
+class SlowLine:
+    """A line in memory that takes its time for each byte; each direction has its own."""
+
+    window = 16
+    in_flight = 8
+    reorder_window = 0.0
+
+    def __init__(self, inner: Transport) -> None:
+        self._inner = inner
+        self._loop = asyncio.get_running_loop()
+        self._out = self._in = 0.0
+        self._arrived: asyncio.Queue[bytes | Exception] = asyncio.Queue()
+        self._tasks = {asyncio.create_task(self._read())}
+
+    def write(self, data: bytes) -> bool:
+        """Take a frame; it reaches the arm once its last byte has gone out."""
+        self._out = max(self._out, self._loop.time()) + len(data) * BITS / BAUD
+        self._loop.call_at(self._out, self._reach, data)
+        return True
+
+    async def send(self, data: bytes) -> None:
+        """As `write`."""
+        self.write(data)
+
+    async def receive(self) -> bytes:
+        """Return what has come in whole."""
+        found = await self._arrived.get()
+        if isinstance(found, Exception):
+            raise found
+
+        return found
+
+    async def aclose(self) -> None:
+        """Close it."""
+        await self._inner.aclose()
+        await asyncio.wait(self._tasks)
+
+    def _reach(self, data: bytes) -> None:
+        task = asyncio.create_task(self._inner.send(data))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _read(self) -> None:
+        try:
+            while True:
+                data = await self._inner.receive()
+                self._in = max(self._in, self._loop.time()) + len(data) * BITS / BAUD
+                self._loop.call_at(self._in, self._arrived.put_nowait, data)
+        except Exception as error:  # noqa: BLE001 - whoever receives is told
+            self._arrived.put_nowait(error)
+
+
+async def open_url(url: SplitResult, *, arm: str) -> Transport:
+    """Open `slow://HOST`: `sim://HOST` over a slow line."""
+    return SlowLine(await open_transport(f"sim://{url.netloc}", arm=arm))
+
+
+SCHEMES["slow"] = (Path(__file__).stem, "slow://HOST")
 
 
 @dataclass
@@ -110,7 +181,7 @@ async def measured(kind: Kind, rounds: int) -> tuple[Row, Circle]:
     loop = asyncio.get_running_loop()
     async with simulate(kind.model, **kind.details) as sim:
         sim.arm.device.place(kind.joints)
-        async with kind.family.connect(sim.url.replace("sim://", "slow://")) as arm:
+        async with kind.family.connect(sim.url.replace("sim://", "slow://"), **kind.connect) as arm:
             if kind.family is Magician:
                 await arm.set_speed(kind.percent)
 
@@ -157,6 +228,23 @@ async def measured(kind: Kind, rounds: int) -> tuple[Row, Circle]:
     )
 
 
+def percentile(values: Sequence[float], percent: float) -> float:
+    """The value below which so many percent lie: the nearest one that was measured."""
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(len(ordered) * percent / 100))]
+
+
+def show(rows: Sequence[Row]) -> None:
+    """Print a table with a column for each key of the first row."""
+    lines = [
+        list(rows[0]),
+        *([f"{value:,}" if isinstance(value, int) else str(value) for value in row.values()] for row in rows),
+    ]
+    widths = [max(len(line[place]) for line in lines) for place in range(len(lines[0]))]
+    for line in lines:
+        print("  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+
+
 def plot(circles: dict[str, Circle], file: Path) -> None:
     """Draw the lags over the time."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - only for a plot
@@ -183,7 +271,7 @@ def main() -> None:
     options.add_argument("--plot", type=Path)
     chosen = options.parse_args()
     rounds = 3 if chosen.quick else chosen.rounds
-    sys.modules[bench_lateness.__name__] = bench_lateness  # where the scheme is looked for
+    sys.modules[Path(__file__).stem] = sys.modules[__name__]  # where the scheme is looked for
     rows: list[Row] = []
     circles: dict[str, Circle] = {}
     for name, kind in KINDS.items():
@@ -195,7 +283,10 @@ def main() -> None:
     if chosen.plot:
         plot(circles, chosen.plot)
 
-    show("following", rows, as_json=chosen.json, rounds=rounds)
+    if chosen.json:
+        print(json.dumps({"benchmark": "following", "rounds": rounds, "rows": rows}))
+    else:
+        show(rows)
 
 
 if __name__ == "__main__":

@@ -24,10 +24,10 @@ from dobot_async._core.util.arguments import check_duration
 from dobot_async._core.util.tasks import STAYING, cancel_and_join
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, MotionUnknown, another
 from dobot_async.following.boundary import Boundary
-from dobot_async.following.follow import SETTLE, Follow
+from dobot_async.following.follow import Follow
 from dobot_async.following.strategy import FollowLimits, Strategy
 
-__all__ = ["MAX_SPEED", "MAX_TURN", "RATE", "STALE", "follow_target"]
+__all__ = ["MAX_SPEED", "MAX_TURN", "RATE", "STALE", "follow_target", "positive"]
 
 logger = logging.getLogger("dobot_async.following")
 RATE, MAX_SPEED, MAX_TURN, STALE = 30.0, 100.0, 90.0, 0.3
@@ -104,8 +104,8 @@ async def follow_target(
                 await follow.begun(leading)
                 yield follow
                 follow.close()
-                if not strategy.replaces:  # what nothing ends is let go on to its end, if that is near
-                    await asyncio.wait([leading], timeout=SETTLE)
+                if strategy.settle:  # what nothing ends is let go on to its end, which is near
+                    await asyncio.wait([leading], timeout=strategy.settle)
             except BaseException as error:
                 stopped = MotionStopped("the block of the following was left by an error")
                 failure = await link.cleanup.finish(begin_end(link, queue, strategy, leading, stopped))

@@ -35,12 +35,10 @@ from dobot_async.following.points import (
 from dobot_async.following.strategy import FollowLimits, FollowStatus, Strategy
 from dobot_async.following.trajectory import Trajectory
 
-__all__ = ["SETTLE", "Follow"]
+__all__ = ["Follow"]
 
 AGAIN = 0.15  # seconds after which an arm that stands is told once more where to go
 PATIENCE = 1.5  # seconds of standing elsewhere after which an arm does not follow
-SETTLE = 0.2
-"""Seconds for which a short motion that nothing ends is let go on to its end."""
 STEPS = 3.0  # intervals of `rate` by which a setpoint moves on at the most, however late it is
 
 

@@ -65,6 +65,11 @@ class Strategy(Protocol):
         ...
 
     @property
+    def settle(self) -> float:
+        """Seconds for which a motion that nothing ends may go on behind the block; 0 where a stop ends it."""
+        ...
+
+    @property
     def tolerance(self) -> tuple[float, float]:
         """How near counts as there, mm and degrees."""
         ...

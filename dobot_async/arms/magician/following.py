@@ -84,6 +84,7 @@ class Led:
     joints = 4
     turns = False
     replaces = True
+    settle = 0.0
     tolerance = (0.5, 0.5)
     check_every = 0.25
 

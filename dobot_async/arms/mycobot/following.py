@@ -81,6 +81,7 @@ class Led:
 
     turns = True
     replaces = True
+    settle = 0.0
     check_every = 1.0
 
     def __init__(self, channel: Channel, runner: CobotRunner, tolerance: Tolerance, speed: int) -> None:
