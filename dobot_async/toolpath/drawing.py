@@ -100,7 +100,7 @@ class Drawing:
 
         self._arm = arm
         self._plane = plane
-        self._tool = tool
+        self._tool: Tool = tool
         self._reach = reach_of(arm)
         self._pace = DrawingPace(above_zero(acceleration, "acceleration"), whole_percent(percent), bool(constant_speed))
         path = simplified(toolpath, tolerance)
