@@ -111,6 +111,7 @@ ANSWERS ?= 200000
 promises: $(VENV)/.dev
 	PROMISES=all $(BIN)/python -m pytest -n auto tests/promises
 	MOMENTS=all $(BIN)/python -m pytest -n auto tests/fleet/test_past_a_stop.py
+	ENGRAVINGS=200 $(BIN)/python -m pytest -n auto tests/toolpath/test_any_moment.py
 	$(BIN)/python -W ignore tests/promises/stale.py --answers $(ANSWERS)
 	$(BIN)/python tests/panel/endurance.py --minutes 1
 

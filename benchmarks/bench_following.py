@@ -21,7 +21,7 @@ import async_solipsism
 import benchmarks.slow_line  # noqa: F401 - it adds its scheme
 from benchmarks import svg
 from benchmarks.report import Row, percentile, show
-from dobot_async import Magician, MyCobot, UltraArm
+from dobot_async import Box, Magician, MyCobot, UltraArm
 from dobot_async.simulator import UltraArmQuirks, simulate
 
 RADIUS, HERTZ, RATE = 30.0, 0.5, 30.0  # mm, rounds a second, targets a second
@@ -40,6 +40,7 @@ class Kind:
         options: What `following` takes; None queues each target.
         details: What `simulate` takes.
         percent: Of a Magician's speeds and accelerations.
+        connect: What `connect` takes.
     """
 
     model: str
@@ -48,6 +49,7 @@ class Kind:
     options: dict[str, Any] | None = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
     percent: float = 100
+    connect: dict[str, Any] = field(default_factory=dict)
 
 
 MAGICIAN = "magician", Magician, (0.0, 30.0, 40.0, 0.0, 0.0)
@@ -58,12 +60,16 @@ KINDS = {
     "Magician": Kind(*MAGICIAN, details=HOMED),
     "Magician, 50 %": Kind(*MAGICIAN, details=HOMED, percent=50),
     "Magician, clear": Kind(*MAGICIAN, {"way": "clear"}, HOMED),
+    "Magician, workspace": Kind(
+        *MAGICIAN, details=HOMED, connect={"workspace": Box((150, 330), (-90, 90), (-50, 150))}
+    ),
     "Magician, queued": Kind(*MAGICIAN, None, HOMED),
     "myCobot 280": Kind(*COBOT),
     "ultraArm, no ramps": Kind(
         *ULTRAARM, {"constant_speed": True}, {**HOMED, "quirks": UltraArmQuirks(constant_speed=True)}
     ),
     "ultraArm, ramps": Kind(*ULTRAARM, details=HOMED),
+    "ultraArm, ramps, 0.5 s": Kind(*ULTRAARM, {"motion_time": 0.5}, HOMED),
 }
 
 
@@ -110,7 +116,7 @@ async def measured(kind: Kind, rounds: int) -> tuple[Row, Circle]:
     loop = asyncio.get_running_loop()
     async with simulate(kind.model, **kind.details) as sim:
         sim.arm.device.place(kind.joints)
-        async with kind.family.connect(sim.url.replace("sim://", "slow://")) as arm:
+        async with kind.family.connect(sim.url.replace("sim://", "slow://"), **kind.connect) as arm:
             if kind.family is Magician:
                 await arm.set_speed(kind.percent)
 

@@ -182,6 +182,11 @@ def check_palletise(output: str) -> None:
     assert [line.partition(",")[0] for line in output.splitlines()] == ["stacks a part"] * 4 + ["puts back a part"] * 2
 
 
+def check_camera_sorter(output: str) -> None:
+    """It sorts what it has drawn itself; what it does with a picture is in test_scene_examples.py."""
+    assert [numbers(line) for line in output.splitlines()] == [[0], [210, -60], [240, 40]]
+
+
 def check_mcp_session(output: str) -> None:
     """The plan tells which step cannot be done, and the others are done."""
     tools, planned, *done = output.splitlines()
@@ -226,6 +231,7 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "follow_target.py": check_follow_target,
     "teach_and_play.py": check_teach_and_play,
     "palletise.py": check_palletise,
+    "camera_sorter.py": check_camera_sorter,
     "mcp_session.py": check_mcp_session,
     "mqtt_session.py": check_mqtt_session,
     "sync_pick_and_place.py": check_sync_pick_and_place,

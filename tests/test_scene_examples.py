@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from random import Random
 
 import pytest
+from PIL import Image, ImageDraw
 
 from dobot_async import ColorPort, InfraredPort, Magician
 from dobot_async.arms.magician.commands import AccessoryVersion
@@ -119,6 +122,49 @@ async def test_parts_are_stacked_by_their_colour() -> None:
     ]
     for names, stack in ((("0 red", "2 red", "4 red"), stacks[0]), (("1 blue", "3 green", "5 blue"), stacks[1])):
         assert [scene.pieces[name].position for name in names] == [pytest.approx(place, abs=0.1) for place in stack]
+
+
+MARKS = [(170, -120), (170, 120), (290, -120), (290, 120), (230, 0), (200, 60), (260, -60)]
+
+
+def seen(x: float, y: float) -> tuple[float, float]:
+    """Where a camera that looks aslant from behind the table sees a place on it, pixels."""
+    away = 1 + (x - 230) / 900 + y / 4000
+    return 320 + (y * 2.1 - (x - 230) * 0.1) / away, 240 + ((x - 230) * 1.9 + y * 0.05) / away
+
+
+async def test_what_a_camera_sees_is_sorted_by_its_colour(tmp_path: Path) -> None:
+    """The picture is drawn as the camera sees the tops of the parts; marks were touched and noted to a pixel."""
+    parts = {
+        "r1": ("red", (210, -70)),
+        "b1": ("blue", (260, 20)),
+        "r2": ("red", (275, 80)),
+        "b2": ("blue", (190, 40)),
+        "g1": ("green", (240, -30)),
+    }
+    sheet = Image.new("RGB", (640, 480), (190, 185, 175))
+    pen = ImageDraw.Draw(sheet)
+    for color, (x, y) in parts.values():
+        corners = [seen(x + dx * 9, y + dy * 9) for dx, dy in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+        pen.polygon(corners, fill={"red": (210, 40, 45), "blue": (35, 60, 205), "green": (40, 170, 60)}[color])
+
+    random = Random(5)
+    noise = bytes(random.randrange(256) for _ in range(640 * 480 * 3))
+    sheet = Image.blend(sheet, Image.frombytes("RGB", sheet.size, noise), 0.08)
+    pairs = [[*(round(pixel) for pixel in seen(x, y)), x, y] for x, y in MARKS]
+    picture, calibration = tmp_path / "table.png", tmp_path / "marks.json"
+    sheet.save(picture)
+    calibration.write_text(json.dumps(pairs), encoding="utf-8")
+    scene = Scene(pieces=[Piece(name, at, (18.0, 18.0, 25.0), color) for name, (color, at) in parts.items()])
+    lines = await run(scene, "camera_sorter.py", str(picture), str(calibration))
+    assert float(lines[0].split()[-2]) < 1.0
+    assert len(lines) == 5
+    assert {scene.pieces[name].position[2] for name in parts} == {-138}
+    for names, (x, y) in (({"r1", "r2"}, (150, 170)), ({"b1", "b2"}, (150, -210))):
+        stack = sorted(scene.pieces[name].position[:2] for name in names)
+        assert stack == [pytest.approx(place, abs=1.0) for place in ((x, y), (x + 40, y))]
+
+    assert scene.pieces["g1"].position == pytest.approx((240, -30, -138), abs=0.01)
 
 
 def distance(place: tuple[float, float], points: list[tuple[float, float]]) -> float:

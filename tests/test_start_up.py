@@ -14,7 +14,7 @@ from dobot_async.arms.registry import REGISTERED
 
 ROOT = Path(dobot_async.__file__).parent
 LATE = ["serial", "serial_asyncio", "bleak", "zenoh", "click", "rich", "dobot_async.simulator", "dobot_async.cli"]
-LATE += ["dobot_async.toolpath", "svgelements", "ezdxf", "PIL", "numpy", "potrace", "HersheyFonts", "aiohttp"]
+LATE += ["dobot_async.toolpath", "svgelements", "ezdxf", "PIL", "numpy", "HersheyFonts", "aiohttp"]
 LATE += ["mcp", "aiomqtt", "prometheus_client", "pydantic", "dobot_async.mcp_server", "dobot_async.mqtt"]
 IMPORTERS = {"import_module", "__import__", "importlib"}
 

@@ -28,7 +28,6 @@ from dobot_async import (
     PTPMode,
     ReplyTimeout,
     UltraArm,
-    UnsupportedError,
     Workspace,
 )
 from dobot_async._core.util.shapes import Shape
@@ -469,17 +468,6 @@ async def test_what_is_no_workspace_is_refused_by_all_arms() -> None:
 
     with pytest.raises(ValueError, match="allowed, or forbidden"):
         Workspace()
-
-
-@pytest.mark.parametrize(("model", "kind"), [("magician", Magician), ("mycobot280", MyCobot), ("ultraarm", UltraArm)])
-@virtual
-async def test_an_arm_that_keeps_a_workspace_follows_nothing(model: str, kind: Any) -> None:
-    async with simulate(model) as sim, kind.connect(sim.url, workspace=Box(z=(-1000, 1000))) as arm:
-        with pytest.raises(UnsupportedError, match="workspace"):
-            async with arm.following():
-                pass
-
-        assert not sim.arm.executed
 
 
 shapes: st.SearchStrategy[Shape] = st.one_of(

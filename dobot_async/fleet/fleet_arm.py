@@ -12,6 +12,7 @@ from typing import Any, cast
 from dobot_async._core.protocol.contract import LinkState
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
+from dobot_async._core.util.bounds import Bounds
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.arms.base import Arm
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped
@@ -95,6 +96,11 @@ class FleetArm:
     def queue(self) -> FleetQueue:
         """The arm's queue."""
         return cast(FleetQueue, self.arm.queue)  # each class of `FleetFamily.kind` has one
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """The limits of the arm, if it has any and is guarded."""
+        return self.guard.bounds if self.guard else None
 
     async def begin(self, arm: Arm, options: Mapping[str, Any]) -> None:
         """Takes an arm that was just connected, with these options."""

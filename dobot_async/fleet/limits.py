@@ -7,7 +7,7 @@ where it begins.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from dobot_async._core.util.shapes import Box
@@ -59,6 +59,15 @@ class FleetLimits:
                 raise ValueError(
                     f"{self.name}: the way leaves the arm's limits, at ({x:.1f}, {y:.1f}, {z:.1f}) of the cell"
                 )
+
+    def check_way(self, places: Iterable[Sequence[float]]) -> None:
+        """Raise ValueError for a straight way that ends outside, or leads further out; see `Bounds`."""
+        line = [(float(x), float(y), float(z)) for x, y, z, *_ in places]
+        self.check(line, line[0])
+
+    def excess(self, place: Sequence[float]) -> tuple[float, ...]:
+        """Return how many mm a place is outside; see `Bounds`."""
+        return (self._outside((place[0], place[1], place[2])),)
 
     async def watch(self, look: Callable[[], Awaitable[XYZ]]) -> str:
         """Watch an arm that jogs; return why it has to be stopped: soon it would be outside, or further outside."""

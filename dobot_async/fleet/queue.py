@@ -14,6 +14,7 @@ from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_timeout
+from dobot_async._core.util.bounds import Bounds, both
 from dobot_async.errors import DobotError
 from dobot_async.fleet.zones import here
 
@@ -22,6 +23,11 @@ __all__ = ["FleetQueue", "MotionGate"]
 
 class MotionGate(Protocol):
     """What a queue of the fleet reports to."""
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """Where the tool may be; None where the fleet does not limit it."""
+        ...
 
     def admitted(
         self, motions: Sequence[Motion], timeout: float | None, epoch: Epoch
@@ -53,6 +59,11 @@ class FleetQueue(MotionQueue):
     """
 
     gate: MotionGate | None = None
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """Where the tool may be: in the arm's workspace, and within its limits in the fleet."""
+        return both(super().bounds, self.gate.bounds if self.gate else None)
 
     async def put_all(
         self, motions: Sequence[Motion], *, timeout: float | None = None, epoch: Epoch | None = None

@@ -6,7 +6,7 @@
 Each family brings a small `Strategy`: how its arm is sent to a place in place of where it goes now.
 """
 
-from dobot_async.following.block import MAX_SPEED, MAX_TURN, RATE, STALE, follow_target
+from dobot_async.following.block import MAX_SPEED, MAX_TURN, RATE, STALE, follow_target, positive
 from dobot_async.following.follow import Follow
 from dobot_async.following.points import TargetPoint
 from dobot_async.following.strategy import FollowStatus, Strategy
@@ -21,4 +21,5 @@ __all__ = [
     "Strategy",
     "TargetPoint",
     "follow_target",
+    "positive",
 ]

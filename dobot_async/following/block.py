@@ -22,11 +22,12 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_duration
 from dobot_async._core.util.tasks import STAYING, cancel_and_join
-from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, MotionUnknown, UnsupportedError, another
-from dobot_async.following.follow import SETTLE, Follow, FollowLimits
-from dobot_async.following.strategy import Strategy
+from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, MotionUnknown, another
+from dobot_async.following.boundary import Boundary
+from dobot_async.following.follow import Follow
+from dobot_async.following.strategy import FollowLimits, Strategy
 
-__all__ = ["MAX_SPEED", "MAX_TURN", "RATE", "STALE", "follow_target"]
+__all__ = ["MAX_SPEED", "MAX_TURN", "RATE", "STALE", "follow_target", "positive"]
 
 logger: logging.Logger = logging.getLogger("dobot_async.following")
 RATE, MAX_SPEED, MAX_TURN, STALE = 30.0, 100.0, 90.0, 0.3
@@ -84,9 +85,6 @@ async def follow_target(
         max_speed: mm/s of the setpoint, above 0.
         max_turn: Degrees/s of angles and joints, above 0.
         stale: Seconds for which a target counts, above 0.
-
-    Raises:
-        UnsupportedError: The arm was connected with a workspace.
     """
     pace = FollowLimits(
         positive(rate, "rate", FASTEST),
@@ -94,22 +92,20 @@ async def follow_target(
         positive(max_turn, "max_turn"),
         positive(stale, "stale"),
     )
-    if queue.kept:
-        raise UnsupportedError("an arm that keeps a workspace follows nothing: its ways are not known in time")
-
     motion = Motion(Unwatched(), Entry(FOLLOWING, None, None))
     motion.call = motion  # it need not be sent to be awaited
     async with queue.roaming():
         await queue.update()
         with queue.led_by(motion):
-            follow = Follow(strategy, motion, pace, lambda: link.outages)
+            boundary = Boundary(queue.bounds, strategy)
+            follow = Follow(strategy, motion, pace, boundary, lambda: link.outages)
             leading = asyncio.create_task(lead(queue, follow), name="dobot_async following")
             try:
                 await follow.begun(leading)
                 yield follow
                 follow.close()
-                if not strategy.replaces:  # what nothing ends is let go on to its end, if that is near
-                    await asyncio.wait([leading], timeout=SETTLE)
+                if strategy.settle:  # what nothing ends is let go on to its end, which is near
+                    await asyncio.wait([leading], timeout=strategy.settle)
             except BaseException as error:
                 stopped = MotionStopped("the block of the following was left by an error")
                 failure = await link.cleanup.finish(begin_end(link, queue, strategy, leading, stopped))

@@ -16,13 +16,13 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
 from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import CommandRejected, MotionStopped, MotionUnknown, another
+from dobot_async.following.boundary import Boundary
 from dobot_async.following.points import (
     GRAIN,
     TargetPoint,
@@ -32,33 +32,14 @@ from dobot_async.following.points import (
     read_point,
     turns_back,
 )
-from dobot_async.following.strategy import FollowStatus, Strategy
+from dobot_async.following.strategy import FollowLimits, FollowStatus, Strategy
 from dobot_async.following.trajectory import Trajectory
 
-__all__ = ["SETTLE", "Follow", "FollowLimits"]
+__all__ = ["Follow"]
 
 AGAIN = 0.15  # seconds after which an arm that stands is told once more where to go
 PATIENCE = 1.5  # seconds of standing elsewhere after which an arm does not follow
-SETTLE = 0.2
-"""Seconds for which a short motion that nothing ends is let go on to its end."""
 STEPS = 3.0  # intervals of `rate` by which a setpoint moves on at the most, however late it is
-
-
-@dataclass(frozen=True, slots=True)
-class FollowLimits:
-    """How a target is followed.
-
-    Attributes:
-        rate: Setpoints per second at the most.
-        mm: Speed of the setpoint, mm/s.
-        degrees: The same of angles and joints, degrees/s.
-        stale: Seconds after which a target that was not renewed is not followed any more.
-    """
-
-    rate: float
-    mm: float
-    degrees: float
-    stale: float
 
 
 class Follow:
@@ -69,10 +50,13 @@ class Follow:
         sent: How many setpoints were sent.
     """
 
-    def __init__(self, strategy: Strategy, motion: Motion, pace: FollowLimits, outages: Any) -> None:
+    def __init__(
+        self, strategy: Strategy, motion: Motion, pace: FollowLimits, boundary: Boundary, outages: Callable[[], int]
+    ) -> None:
         self.motion = motion
         self.sent: int = 0
         self._strategy = strategy
+        self._boundary = boundary
         self._pace = pace
         self._outages = outages  # returns how often the link was lost
         self._now = asyncio.get_running_loop().time
@@ -95,7 +79,8 @@ class Follow:
         Angles that are not given stay as they are. What is set counts for `stale` seconds, also if it is the same.
 
         Raises:
-            ValueError: It is beyond the limits, or out of reach; the one before stays.
+            ValueError: It is beyond the limits, out of reach, or outside of the workspace, or the straight way to it
+                is; the one before stays.
             TypeError: It is neither a pose nor numbers.
             DobotError: The following has failed, or was stopped.
         """
@@ -103,7 +88,7 @@ class Follow:
 
     @target.setter
     def target(self, target: Any) -> None:
-        self._renew(self._read(target))
+        self._renew(self._checked(target))
 
     @property
     def joints(self) -> tuple[float, ...] | None:
@@ -112,7 +97,7 @@ class Follow:
 
     @joints.setter
     def joints(self, angles: Any) -> None:
-        self._renew(self._read(angles, joints=True))
+        self._renew(self._checked(angles, joints=True))
 
     @property
     def here(self) -> TargetPoint | None:
@@ -134,7 +119,10 @@ class Follow:
         """
         read = partial(self._read, joints=joints)
         pace = self._pace
-        trajectory = Trajectory(points, read, mm=pace.mm, degrees=pace.degrees, turns=self._strategy.turns)
+        trajectory = Trajectory(
+            points, read, self._boundary.check, mm=pace.mm, degrees=pace.degrees, turns=self._strategy.turns
+        )
+        self._boundary.check(self._start(joints=joints), trajectory.first)
         await self._reach(trajectory.first)
         began = self._now()
         while (elapsed := self._now() - began) < trajectory.seconds:
@@ -154,7 +142,7 @@ class Follow:
             ValueError: It is beyond the limits, or out of reach.
             DobotError: The following has failed, or was stopped.
         """
-        await self._reach(self._read(target, joints=joints))
+        await self._reach(self._checked(target, joints=joints))
 
     async def run(self) -> None:
         """Lead the arm until `close`; for the block.
@@ -165,7 +153,8 @@ class Follow:
         await self._strategy.begin()
         self._checked_at = self._now()
         self._outages_before = self._outages()
-        self._seen(await self._strategy.look(joints=False))
+        self._seen(look := await self._strategy.look(joints=False))
+        self._boundary.begin(look.here)
         self._began.set()
         while not self._closing:
             began = self._now()
@@ -210,6 +199,17 @@ class Follow:
         self._strategy.allow(point)
         return point
 
+    def _checked(self, target: Any, *, joints: bool = False) -> TargetPoint:
+        """The place of a target to which the straight way is allowed, too."""
+        point = self._read(target, joints=joints)
+        self._boundary.check(self._start(joints=joints), point)
+        return point
+
+    def _start(self, *, joints: bool) -> TargetPoint | None:
+        """Where the way to the next target begins."""
+        setpoint = self._setpoint
+        return setpoint if setpoint and setpoint.joints == joints else self._here.get(joints)
+
     def _renew(self, point: TargetPoint) -> None:
         """Follow a checked target from now on."""
         self.check()
@@ -240,13 +240,17 @@ class Follow:
             self._sent_to = None
 
         self._seen(look)
+        self._boundary.watch(look.here)
         elapsed = min(now - self._moved_on_at, STEPS / pace.rate)
         reached = part_of_way(self._setpoint, target, pace.mm * elapsed, pace.degrees * elapsed, turns=strategy.turns)
-        self._setpoint, self._moved_on_at = strategy.within(look, reached), now
+        setpoint = strategy.within(look, reached)
+        # A setpoint that is led round a corner waits there for the arm, which would cut it.
+        obstacle = self._boundary.obstacle(look.here, setpoint)
+        self._setpoint, self._moved_on_at = self._setpoint if obstacle else setpoint, now
         if self._is_due(look, self._setpoint):
             await self._send(look.here, self._setpoint)
 
-        self._check_standing(look.here, self._setpoint if strategy.replaces else target)
+        self._check_standing(look.here, target if obstacle or not strategy.replaces else self._setpoint, obstacle)
         if now >= self._checked_at + strategy.check_every:
             self._checked_at = now
             await strategy.check()
@@ -294,9 +298,12 @@ class Follow:
         """Whether the arm is at a place."""
         return nearer_than(here, place, self._strategy.tolerance, turns=self._strategy.turns)
 
-    def _check_standing(self, here: TargetPoint, wanted: TargetPoint) -> None:
+    def _check_standing(self, here: TargetPoint, wanted: TargetPoint, obstacle: str) -> None:
         """Raise CommandRejected if the arm has stood for long, elsewhere than it is wanted."""
         if self._now() > self._moved_at + PATIENCE and not self._is_at(here, wanted):
+            if obstacle:
+                raise CommandRejected(f"the arm stands at {here}, for its way on leads outside: {obstacle}")
+
             raise CommandRejected(
                 f"the arm answers, and stands at {here}, although it was sent to {wanted}: is that within reach, is it "
                 "homed, has it power, does its firmware replace motions?"

@@ -8,8 +8,18 @@ from dataclasses import dataclass
 from typing import Any, SupportsFloat, cast
 
 from dobot_async._core.util.arguments import to_float
+from dobot_async.errors import UnsupportedError
 
-__all__ = ["TargetPoint", "apart", "nearer_than", "part_of_way", "read_point", "turns_back", "way_along"]
+__all__ = [
+    "TargetPoint",
+    "apart",
+    "nearer_than",
+    "part_of_way",
+    "read_point",
+    "straight_way",
+    "turns_back",
+    "way_along",
+]
 
 GRAIN = 0.02
 """mm and degrees; what is nearer is the same place."""
@@ -89,6 +99,17 @@ def way_along(start: TargetPoint, end: TargetPoint, *, turns: bool = False) -> t
     found = gaps(start, end, turns=turns)
     split = 0 if end.joints else 3
     return math.hypot(*found[:split]), max(map(abs, found[split:]), default=0.0)
+
+
+def straight_way(start: TargetPoint, end: TargetPoint) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the places (x, y, z) at the ends of a straight way; raise UnsupportedError for one in joints."""
+    if end.joints:
+        raise UnsupportedError(
+            "joints cannot be followed within a workspace or limits: the driver does not know where those of this arm "
+            "lead; follow coordinates"
+        )
+
+    return start.numbers[:3], end.numbers[:3]
 
 
 def apart(start: TargetPoint, end: TargetPoint, *, turns: bool = False) -> float:

@@ -8,7 +8,24 @@ from typing import Protocol
 
 from dobot_async.following.points import TargetPoint
 
-__all__ = ["FollowStatus", "Strategy"]
+__all__ = ["FollowLimits", "FollowStatus", "Strategy"]
+
+
+@dataclass(frozen=True, slots=True)
+class FollowLimits:
+    """How a target is followed.
+
+    Attributes:
+        rate: Setpoints per second at the most.
+        mm: Speed of the setpoint, mm/s.
+        degrees: The same of angles and joints, degrees/s.
+        stale: Seconds after which a target that was not renewed is not followed any more.
+    """
+
+    rate: float
+    mm: float
+    degrees: float
+    stale: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +65,11 @@ class Strategy(Protocol):
         ...
 
     @property
+    def settle(self) -> float:
+        """Seconds for which a motion that nothing ends may go on behind the block; 0 where a stop ends it."""
+        ...
+
+    @property
     def tolerance(self) -> tuple[float, float]:
         """How near counts as there, mm and degrees."""
         ...
@@ -59,6 +81,14 @@ class Strategy(Protocol):
 
     def allow(self, point: TargetPoint) -> None:
         """Raise ValueError for a place that is beyond the limits, or out of reach."""
+
+    def way(self, start: TargetPoint, end: TargetPoint) -> Sequence[tuple[float, ...]]:
+        """Return places (x, y, z, mm) on the way that the arm goes from one point to another, its ends among them.
+
+        Raises:
+            UnsupportedError: They are in joints, and the driver does not know where those lead.
+        """
+        ...
 
     async def begin(self) -> None:
         """Make the arm ready to be led; raise CommandRejected if it cannot be now."""

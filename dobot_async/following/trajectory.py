@@ -21,6 +21,7 @@ class Trajectory:
     Args:
         points: Pairs of seconds and a target, the times growing.
         read: Returns the checked place of a target.
+        check: Raises ValueError for a straight way from one place to another that is not allowed.
         mm: Speed of the tool, mm/s, that may not be passed.
         degrees: The same of angles and joints, degrees/s.
         turns: Whether angles of a pose go the short way round.
@@ -39,6 +40,7 @@ class Trajectory:
         self,
         points: Iterable[tuple[float, Any]],
         read: Callable[[Any], TargetPoint],
+        check: Callable[[TargetPoint, TargetPoint], None],
         *,
         mm: float,
         degrees: float,
@@ -51,6 +53,7 @@ class Trajectory:
             try:
                 self._times.append(check_duration(seconds, "the time"))
                 self._places.append(read(target))
+                check(self._places[max(0, number - 1)], self._places[number])
             except ValueError as error:
                 raise ValueError(f"point {number} (from 0) of the trajectory: {error}") from error
 

@@ -37,7 +37,8 @@ class Follow(Twin[AsyncFollow]):
         Angles that are not given stay as they are. What is set counts for `stale` seconds, also if it is the same.
 
         Raises:
-            ValueError: It is beyond the limits, or out of reach; the one before stays.
+            ValueError: It is beyond the limits, out of reach, or outside of the workspace, or the straight way to it
+                is; the one before stays.
             TypeError: It is neither a pose nor numbers.
             DobotError: The following has failed, or was stopped.
         """

@@ -40,12 +40,14 @@ class Drawing(Twin[AsyncDrawing]):
         tolerance: mm by which points that are left out may be missed; 0 leaves none out.
         acceleration: Of a Magician's continuous path, mm/s².
         percent: Of a myCobot's speed.
+        constant_speed: Of an ultraArm: run without ramps (M16 S0), as the vendor's player runs programs, and go back to
+            ramps behind it. What that does to its motions nobody has measured.
         rate: Commands per second that the line carries; where many short ways follow one another the speed of a
             Magician is made so low that the arm does not use up its queue. None does not look.
         progress: Called with a `Progress` when something was done.
 
     Raises:
-        UnreachableStroke: The arm cannot go there; it names stroke, point and reason.
+        UnreachableStroke: The arm cannot go there, or not in its workspace; it names stroke, point and reason.
         UnsupportedError: The arm has no such tool.
         ValueError: A number is out of range, or there is nothing to draw.
     """
@@ -61,6 +63,7 @@ class Drawing(Twin[AsyncDrawing]):
         tolerance: SupportsFloat = 0.05,
         acceleration: SupportsFloat = 100.0,
         percent: int = 20,
+        constant_speed: bool = False,
         rate: SupportsFloat | None = 120.0,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
@@ -74,6 +77,7 @@ class Drawing(Twin[AsyncDrawing]):
                 tolerance=tolerance,
                 acceleration=acceleration,
                 percent=percent,
+                constant_speed=constant_speed,
                 rate=rate,
                 progress=progress,
             )
@@ -105,7 +109,8 @@ class Drawing(Twin[AsyncDrawing]):
             point: Of a laser: how far in this stroke, as `next_point` of the same toolpath with the same tolerance.
 
         Raises:
-            UnreachableStroke: The way from where the arm is to the first stroke is out of reach; nothing was sent.
+            UnreachableStroke: The way from where the arm is to the first stroke is out of reach, or from there a limit
+                of a myCobot's joints is in the way of a stroke; nothing has moved.
             DobotError: As `arm.queue.put` and `Motion.wait`, with a note that tells the stroke. The arm was stopped.
             RuntimeError: It is being drawn already.
         """
@@ -154,6 +159,7 @@ def estimate(
     tolerance: SupportsFloat = 0.05,
     acceleration: float = 100.0,
     percent: int = 20,
+    constant_speed: bool = False,
     rate: SupportsFloat | None = 120.0,
 ) -> Estimate:
     """Return how long a drawing takes, by drawing it with a simulated arm. It takes two seconds for 10,000 points.
@@ -169,6 +175,7 @@ def estimate(
         tolerance: mm.
         acceleration: mm/s².
         percent: Of a myCobot's speed.
+        constant_speed: Of an ultraArm whose firmware takes the ramps away when it is told to.
         rate: Commands per second.
 
     Raises:
@@ -184,6 +191,7 @@ def estimate(
         tolerance=tolerance,
         acceleration=acceleration,
         percent=percent,
+        constant_speed=constant_speed,
         rate=rate,
     )
 

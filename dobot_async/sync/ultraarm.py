@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager
 from typing import Any, Literal, Self, SupportsFloat, TypeVar
 
 from dobot_async._core.protocol.wire import Command
+from dobot_async._core.util.bounds import Bounds
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.workspace import Workspace
 from dobot_async.arms.info import DeviceInfo
@@ -89,6 +90,11 @@ class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
             ConnectionLost: The link is gone.
         """
         return Motion(PORTAL.run(lambda: self.asynchronous.put(command, value, timeout=timeout)))
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """Where the tool may be, for who sends the arm about without the queue; None where nothing limits it."""
+        return self.asynchronous.bounds
 
     def join(self, timeout: float | None = None) -> None:
         """Return when all that was put has been executed.
@@ -417,11 +423,13 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
         max_speed: SupportsFloat = 100.0,
         max_turn: SupportsFloat = 90.0,
         stale: SupportsFloat = 0.3,
+        motion_time: SupportsFloat = 0.1,
         constant_speed: bool = False,
     ) -> AbstractContextManager[Follow]:
         """Let the arm follow a target for the length of a block; at its end the arm comes to rest.
 
-        It goes in short motions of about 0.1 s, for nothing ends one: with ramps that is slow, a few mm/s to some tens.
+        It goes in short motions of about `motion_time`, for nothing ends one: with ramps that is slow, a few mm/s to
+        some tens.
         While it lasts commands are refused, those of the tools too, and jogs.
 
         Args:
@@ -429,6 +437,8 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
             max_speed: mm/s, above 0; the arm's F is 1 to 200.
             max_turn: The same of e, and of joints: degrees/s.
             stale: Seconds after which the arm comes to rest if the target was not renewed.
+            motion_time: Seconds that each motion is to take, above 0 to 2. With ramps the arm gets on faster the longer
+                they are, and cuts corners more; after the block it goes on for so long, up to twice.
             constant_speed: Run without ramps (M16 S0), as the vendor's library does in programs, and put that back
                 after it (M16 S2). What it does to single motions nobody has measured.
 
@@ -442,7 +452,12 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
         """
         return BlockingContext(
             lambda: self.asynchronous.following(
-                rate=rate, max_speed=max_speed, max_turn=max_turn, stale=stale, constant_speed=constant_speed
+                rate=rate,
+                max_speed=max_speed,
+                max_turn=max_turn,
+                stale=stale,
+                motion_time=motion_time,
+                constant_speed=constant_speed,
             ),
             Follow,
             "__call__",

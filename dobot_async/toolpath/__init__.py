@@ -8,7 +8,7 @@
 Readers of files need the extra `draw`, and say so where it is missing; `import dobot_async` imports nothing of this.
 """
 
-from dobot_async.toolpath.drawing import Drawing, draw, engrave
+from dobot_async.toolpath.drawing import Drawing
 from dobot_async.toolpath.dxf import read_dxf
 from dobot_async.toolpath.errors import MissingLibrary, ToolpathFileError, UnreachableStroke
 from dobot_async.toolpath.estimate import Estimate, estimate
@@ -23,6 +23,7 @@ from dobot_async.toolpath.svg import read_svg
 from dobot_async.toolpath.text import fonts, write_text
 from dobot_async.toolpath.toolpath import Toolpath
 from dobot_async.toolpath.trace import trace_picture
+from dobot_async.toolpath.verbs import draw, engrave
 
 __all__ = [
     "Bounds",

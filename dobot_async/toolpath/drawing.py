@@ -25,10 +25,11 @@ from dobot_async.arms.magician.arm import Magician
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.errors import ArmAlarm, DobotError, MotionStopped, another
+from dobot_async.toolpath.joints import check_joints
 from dobot_async.toolpath.moves import Tool, ToolpathMove, approach, check_moves, from_point
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.position import Sent, StrokePosition, along, stand_of
-from dobot_async.toolpath.programs import DrawingPace, Instruction, check_tool, program_for
+from dobot_async.toolpath.programs import DrawingPace, Instruction, back_to_ramps, check_tool, program_for
 from dobot_async.toolpath.progress import Progress, ProgressMeter
 from dobot_async.toolpath.reach import reach_of
 from dobot_async.toolpath.schedule import (
@@ -44,7 +45,7 @@ from dobot_async.toolpath.schedule import (
 )
 from dobot_async.toolpath.toolpath import Toolpath
 
-__all__ = ["Drawing", "DrawingArm", "draw", "engrave"]
+__all__ = ["Drawing", "DrawingArm"]
 
 DrawingArm = Magician | UltraArm | MyCobot
 LOOK = 0.5  # seconds between two questions how far the arm is, while commands are sent: each takes the line for a while
@@ -63,12 +64,14 @@ class Drawing:
         tolerance: mm by which points that are left out may be missed; 0 leaves none out.
         acceleration: Of a Magician's continuous path, mm/s².
         percent: Of a myCobot's speed.
+        constant_speed: Of an ultraArm: run without ramps (M16 S0), as the vendor's player runs programs, and go back to
+            ramps behind it. What that does to its motions nobody has measured.
         rate: Commands per second that the line carries; where many short ways follow one another the speed of a
             Magician is made so low that the arm does not use up its queue. None does not look.
         progress: Called with a `Progress` when something was done.
 
     Raises:
-        UnreachableStroke: The arm cannot go there; it names stroke, point and reason.
+        UnreachableStroke: The arm cannot go there, or not in its workspace; it names stroke, point and reason.
         UnsupportedError: The arm has no such tool.
         ValueError: A number is out of range, or there is nothing to draw.
     """
@@ -84,6 +87,7 @@ class Drawing:
         tolerance: SupportsFloat = TOLERANCE,
         acceleration: SupportsFloat = 100.0,
         percent: int = 20,
+        constant_speed: bool = False,
         rate: SupportsFloat | None = RATE,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
@@ -91,16 +95,19 @@ class Drawing:
         if speed is not None and isinstance(arm, MyCobot):
             raise ValueError("a myCobot knows no speed in mm/s: give percent= (1 to 100) instead")
 
+        if constant_speed and not isinstance(arm, UltraArm):
+            raise ValueError("constant_speed is for an ultraArm alone: others have no such mode")
+
         self._arm = arm
         self._plane = plane
         self._tool: Tool = tool
         self._reach = reach_of(arm)
-        self._pace = DrawingPace(above_zero(acceleration, "acceleration"), whole_percent(percent))
+        self._pace = DrawingPace(above_zero(acceleration, "acceleration"), whole_percent(percent), bool(constant_speed))
         path = simplified(toolpath, tolerance)
         self._strokes = planned(path, plane, tool, speed, rate if isinstance(arm, Magician) else None)
         lengths, guesses = [stroke.length for stroke in path], [guess(moves) for moves in self._strokes]
         self._meter = ProgressMeter(lengths, guesses, progress)
-        check_moves((move for moves in self._strokes for move in moves), self._reach)
+        check_moves((move for moves in self._strokes for move in moves), self._reach, bounds=arm.queue.bounds)
         self._running: asyncio.Task[Any] | None = None
         self._stopped = False
         self._epoch = Epoch()
@@ -132,7 +139,8 @@ class Drawing:
             point: Of a laser: how far in this stroke, as `next_point` of the same toolpath with the same tolerance.
 
         Raises:
-            UnreachableStroke: The way from where the arm is to the first stroke is out of reach; nothing was sent.
+            UnreachableStroke: The way from where the arm is to the first stroke is out of reach, or from there a limit
+                of a myCobot's joints is in the way of a stroke; nothing has moved.
             DobotError: As `arm.queue.put` and `Motion.wait`, with a note that tells the stroke. The arm was stopped.
             RuntimeError: It is being drawn already.
         """
@@ -150,7 +158,10 @@ class Drawing:
         try:
             here, program = await program_for(self._arm, self._tool, self._pace)
             moves = self._moves(here)
-            check_moves(moves, self._reach, here)
+            check_moves(moves, self._reach, here, self._arm.queue.bounds)
+            if isinstance(self._arm, MyCobot):
+                await check_joints(self._arm, moves, here)
+
             await self._draw(list(program.instructions(moves)), here)
         finally:
             self._running = None
@@ -201,6 +212,9 @@ class Drawing:
             await cleanup.finish(
                 cleanup.start(self._locate(pending, deadline), "the search where a drawing was stopped")
             )
+
+        if self._pace.constant_speed:
+            cleanup.start(back_to_ramps(self._arm), "going back to ramps")
 
         error.add_note(self._note())
         if failure:
@@ -266,33 +280,3 @@ class Drawing:
         before = self.next_stroke
         self._position = position if self._tool == "laser" else StrokePosition(position.stroke)
         self._meter.reached(before, self.next_stroke, asyncio.get_running_loop().time())
-
-
-async def draw(arm: DrawingArm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, **options: Any) -> None:
-    """Draw a toolpath with a pen, and return when the arm has done it; see `Drawing`, which can be stopped.
-
-    Args:
-        arm: A connected Magician, UltraArm or MyCobot.
-        toolpath: What to draw.
-        plane: Where the paper lies.
-        first: The stroke, from 0, to begin with.
-        options: As for `Drawing`: speed, tolerance, acceleration, percent, rate, progress.
-    """
-    await Drawing(arm, toolpath, plane, tool="pen", **options).run(first=first)
-
-
-async def engrave(
-    arm: DrawingArm,
-    toolpath: Toolpath,
-    plane: WorkPlane,
-    *,
-    first: int = 0,
-    point: SupportsFloat = 0.0,
-    **options: Any,
-) -> None:
-    """Engrave a toolpath with a laser, which is off on every way out; see `draw`.
-
-    The plane is that of the focus: the laser is moved in it, and lifted on the way to the first stroke alone. A dot is
-    a line of 0.1 mm. With `first` and `point` it goes on where it was stopped.
-    """
-    await Drawing(arm, toolpath, plane, tool="laser", **options).run(first=first, point=point)

@@ -21,7 +21,7 @@ from dobot_async.errors import UnsupportedError
 from dobot_async.simulator.magician.arm import MAGICIAN, SimulatedMagician
 from dobot_async.simulator.mycobot.arm import SimulatedMyCobot
 from dobot_async.simulator.mycobot.body import MYCOBOT
-from dobot_async.simulator.ultraarm.arm import ULTRAARM, SimulatedUltraArm
+from dobot_async.simulator.ultraarm.arm import ULTRAARM, SimulatedUltraArm, UltraArmQuirks
 from dobot_async.toolpath.moves import MoveKind, Tool, approach
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.programs import CobotProgram, DrawingPace, DrawingProgram, MagicianProgram, UltraArmProgram
@@ -32,6 +32,7 @@ __all__ = ["Estimate", "estimate"]
 
 ROOM = 1_000_000
 HOMING = 1e3  # seconds in which an arm is at home
+BETWEEN = 0.14  # seconds from the end of a myCobot's motion until it was seen to stand, and the next one begins
 END = 1e9  # seconds; by then every drawing is done
 
 
@@ -73,12 +74,19 @@ class Bench:
         arm: The simulated arm.
         here: Where it stands.
         program: How it is told.
+        between: Seconds that pass between two motions of an arm that is given one at a time.
     """
 
     def __init__(
-        self, arm: Any, encode: Callable[[Command[Any, Any], bytes], bytes], here: Place, program: DrawingProgram
+        self,
+        arm: Any,
+        encode: Callable[[Command[Any, Any], bytes], bytes],
+        here: Place,
+        program: DrawingProgram,
+        between: float = 0.0,
     ) -> None:
         self.arm = arm
+        self.between = between
         self.here = here
         self.program = program
         self._encode = encode
@@ -99,6 +107,7 @@ def estimate(
     tolerance: SupportsFloat = TOLERANCE,
     acceleration: float = 100.0,
     percent: int = 20,
+    constant_speed: bool = False,
     rate: SupportsFloat | None = RATE,
 ) -> Estimate:
     """Return how long a drawing takes, by drawing it with a simulated arm. It takes two seconds for 10,000 points.
@@ -114,6 +123,7 @@ def estimate(
         tolerance: mm.
         acceleration: mm/s².
         percent: Of a myCobot's speed.
+        constant_speed: Of an ultraArm whose firmware takes the ramps away when it is told to.
         rate: Commands per second.
 
     Raises:
@@ -127,7 +137,7 @@ def estimate(
     if not moves:
         return Estimate(0.0, 0.0, 0.0, ())
 
-    bench = bench_of(arm, clock, tool, DrawingPace(acceleration, percent), moves[0].place)
+    bench = bench_of(arm, clock, tool, DrawingPace(acceleration, percent, bool(constant_speed)), moves[0].place)
 
     instructions = list(bench.program.instructions(approach(bench.here, moves, plane) + moves))
     begun, before = clock.now, len(bench.arm.executed)
@@ -137,18 +147,19 @@ def estimate(
     clock.now = END
     done = bench.arm.executed[before:]
     ends: dict[int, float] = {}
-    for each, record in zip(instructions, done, strict=False):
+    for number, (each, record) in enumerate(zip(instructions, done, strict=False)):
         stroke = each.move.stroke if each.move else None
         if record.outcome != "done":
             raise ValueError(f"stroke {stroke} cannot be drawn by the simulated arm")
 
         if each.move and each.move.kind in {MoveKind.DRAW, MoveKind.LIFT}:
-            ends[each.move.stroke] = record.finished - begun
+            ends[each.move.stroke] = record.finished - begun + number * bench.between
 
     if len(done) < len(instructions):
         raise ValueError(f"stroke {len(ends)} cannot be drawn by the simulated arm")
 
-    return Estimate(done[-1].finished - begun, path.length, path.travel, tuple(ends.values()))
+    seconds = done[-1].finished - begun + len(done) * bench.between
+    return Estimate(seconds, path.length, path.travel, tuple(ends.values()))
 
 
 def magician(kinematics: Kinematics, clock: Clock, tool: Tool, pace: DrawingPace) -> Bench:
@@ -161,16 +172,17 @@ def magician(kinematics: Kinematics, clock: Clock, tool: Tool, pace: DrawingPace
     return Bench(arm, lambda row, data: bytes(magician_frame.request(row, data, queued=True)), place_of(pose), program)
 
 
-def ultraarm(clock: Clock, tool: Tool) -> Bench:
+def ultraarm(clock: Clock, tool: Tool, pace: DrawingPace) -> Bench:
     """An ultraArm that has been at home."""
-    arm = SimulatedUltraArm(clock, replace(ULTRAARM, capacity=ROOM, keep=None))
+    quirks = UltraArmQuirks(constant_speed=pace.constant_speed)
+    arm = SimulatedUltraArm(clock, replace(ULTRAARM, capacity=ROOM, keep=None), quirks=quirks)
 
     def encode(row: Command[Any, Any], data: bytes) -> bytes:
         return bytes(ultraarm_frame.encode(row, data, queued=True))
 
     arm.session().receive(encode(u.HOME, u.HOME.request.encode(None)))
     clock.now += HOMING
-    return Bench(arm, encode, place_of(arm.pose), UltraArmProgram(tool))
+    return Bench(arm, encode, place_of(arm.pose), UltraArmProgram(tool, pace))
 
 
 def cobot(model: CobotModel, clock: Clock, pace: DrawingPace, first: Place) -> Bench:
@@ -189,7 +201,7 @@ def cobot(model: CobotModel, clock: Clock, pace: DrawingPace, first: Place) -> B
     def encode(row: Command[Any, Any], data: bytes) -> bytes:
         return bytes(cobot_frame.request(model.row(row), data, queued=True))
 
-    return Bench(arm, encode, first, CobotProgram(rotation, pace))
+    return Bench(arm, encode, first, CobotProgram(rotation, pace), BETWEEN)
 
 
 def place_of(pose: Any) -> Place:
@@ -205,7 +217,7 @@ def bench_of(arm: Any, clock: Clock, tool: Tool, pace: DrawingPace, first: Place
         )
 
     if isinstance(arm, UltraArm) or arm == "ultraarm":
-        return ultraarm(clock, tool)
+        return ultraarm(clock, tool, pace)
 
     model = arm.model if isinstance(arm, MyCobot) else arm if isinstance(arm, CobotModel) else MODELS.get(arm)
     if model is None:

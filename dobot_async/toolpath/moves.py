@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Literal
 
+from dobot_async._core.util.bounds import Bounds
 from dobot_async.toolpath.errors import UnreachableStroke
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.stroke import Stroke
@@ -126,21 +127,33 @@ def from_point(moves: Sequence[ToolpathMove], point: float) -> list[ToolpathMove
     return [replace(moves[0], place=place), *moves[behind + 1 :]] if point else list(moves)  # type: ignore[arg-type]
 
 
-def check_moves(moves: Iterable[ToolpathMove], reach: Reach, here: Place | None = None) -> None:
-    """Look at the reach every few mm of all moves; `here` is where the first one begins.
+def check_moves(
+    moves: Iterable[ToolpathMove], reach: Reach, here: Place | None = None, bounds: Bounds | None = None
+) -> None:
+    """Look at the reach every few mm of all moves, and at all of their ways in a workspace.
+
+    Args:
+        moves: What is to be done.
+        reach: Of the arm.
+        here: Where the first one begins.
+        bounds: Where the tool may be.
 
     Raises:
         UnreachableStroke: The first place that cannot be reached.
     """
     for move in moves:
-        for place in places(here, move.place):
-            try:
+        place = move.place
+        try:
+            for place in places(here, move.place):
                 reach(place)
-            except ValueError as error:
-                way = "" if move.kind is MoveKind.DRAW else f" ({ON_THE_WAY[move.kind]})"
-                alarm = getattr(error, "alarm", None)
-                named = {} if alarm is None else {"alarm": alarm}
-                raise UnreachableStroke(move.stroke, move.point, place, f"{error}{way}", **named) from None
+
+            if bounds:
+                bounds.check_way([here or place, place])
+        except ValueError as error:
+            way = "" if move.kind is MoveKind.DRAW else f" ({ON_THE_WAY[move.kind]})"
+            alarm = getattr(error, "alarm", None)
+            named = {} if alarm is None else {"alarm": alarm}
+            raise UnreachableStroke(move.stroke, move.point, place, f"{error}{way}", **named) from None
 
         here = move.place
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -24,14 +25,15 @@ from dobot_async.arms.mycobot import commands as b
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.ultraarm import commands as u
 from dobot_async.arms.ultraarm.arm import UltraArm
-from dobot_async.errors import UnsupportedError
+from dobot_async.errors import DobotError, UnsupportedError
 from dobot_async.toolpath.moves import MoveKind, Tool, ToolpathMove
 from dobot_async.toolpath.plane import Place
 
-__all__ = ["DrawingPace", "DrawingProgram", "Instruction", "program_for"]
+__all__ = ["DrawingPace", "DrawingProgram", "Instruction", "back_to_ramps", "check_tool", "program_for"]
 
 SLOWEST, FASTEST = 1.0, 200.0  # mm/s of an ultraArm
 SAFE_PERCENT = 20
+RAMPS = u.ModeOfSpeed(u.SpeedMode.RAMPED)
 
 
 class Instruction(NamedTuple):
@@ -49,10 +51,12 @@ class DrawingPace:
     Attributes:
         acceleration: Along a continuous path of a Magician, mm/s².
         percent: Of a myCobot's speed, for it knows no mm/s.
+        constant_speed: Whether an ultraArm is to run without ramps.
     """
 
     acceleration: float = 100.0
     percent: int = SAFE_PERCENT
+    constant_speed: bool = False
 
 
 class DrawingProgram(Protocol):
@@ -110,14 +114,18 @@ class MagicianProgram:
 
 
 class UltraArmProgram:
-    """G1 and M21."""
+    """G1 and M21, without ramps between M16 S0 and M16 S2."""
 
-    def __init__(self, tool: Tool) -> None:
+    def __init__(self, tool: Tool, pace: DrawingPace) -> None:
         self._laser = tool == "laser"
+        self._constant_speed = pace.constant_speed
 
     def instructions(self, moves: Iterable[ToolpathMove]) -> Iterator[Instruction]:
         """Yield the commands of a drawing."""
         duty = 0
+        if self._constant_speed:
+            yield Instruction(u.SET_SPEED_MODE, u.ModeOfSpeed(u.SpeedMode.CONSTANT), None)
+
         if self._laser:
             yield Instruction(u.SET_PWM, u.PWM(0), None)
             yield Instruction(u.LASER_ON, None, None)
@@ -135,6 +143,9 @@ class UltraArmProgram:
         if self._laser:
             yield Instruction(u.SET_PWM, u.PWM(0), None)
             yield Instruction(u.LASER_OFF, None, None)
+
+        if self._constant_speed:
+            yield Instruction(u.SET_SPEED_MODE, RAMPS, None)
 
 
 class CobotProgram:
@@ -157,10 +168,10 @@ async def of_magician(arm: Magician, tool: Tool, pace: DrawingPace) -> tuple[Pla
     return (pose.x, pose.y, pose.z), MagicianProgram(arm.kinematics, pose.j4, tool, pace)
 
 
-async def of_ultraarm(arm: UltraArm, tool: Tool, _: DrawingPace) -> tuple[Place, DrawingProgram]:
+async def of_ultraarm(arm: UltraArm, tool: Tool, pace: DrawingPace) -> tuple[Place, DrawingProgram]:
     """Where an ultraArm is, and how it is told."""
     coords = await arm.request(u.GET_COORDS, None)
-    return (coords.x, coords.y, coords.z), UltraArmProgram(tool)
+    return (coords.x, coords.y, coords.z), UltraArmProgram(tool, pace)
 
 
 async def of_cobot(arm: MyCobot, _: Tool, pace: DrawingPace) -> tuple[Place, DrawingProgram]:
@@ -184,6 +195,13 @@ def check_tool(arm: object, tool: Tool) -> None:
 
     if tool == "laser" and isinstance(arm, MyCobot):
         raise UnsupportedError(f"a {arm.model.title} has no laser: its protocol has no command for one")
+
+
+async def back_to_ramps(arm: object) -> None:
+    """Let an ultraArm whose drawing was broken off use ramps again, behind the stop."""
+    assert isinstance(arm, UltraArm)
+    with suppress(DobotError):
+        await (await arm.queue.put(u.SET_SPEED_MODE, RAMPS))
 
 
 async def program_for(arm: object, tool: Tool, pace: DrawingPace) -> tuple[Place, DrawingProgram]:

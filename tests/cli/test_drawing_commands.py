@@ -276,7 +276,7 @@ async def test_the_way_from_where_the_arm_stands_names_the_stroke_and_nothing_mo
         ("svgelements", ["draw", str(FILES / "shapes.svg")]),
         ("ezdxf", ["draw", str(FILES / "entities.dxf")]),
         ("PIL", ["engrave", str(FILES / "shapes.png")]),
-        ("potrace", ["engrave", str(FILES / "shapes.png"), "--mode", "outline"]),
+        ("numpy", ["engrave", str(FILES / "shapes.png"), "--mode", "outline"]),
         ("HersheyFonts", ["write", "A"]),
     ],
 )

@@ -363,3 +363,26 @@ async def test_reach_tells_why() -> None:
     async with rig(BY_NAME["magician"]) as r, r.following() as follow:
         with pytest.raises(Unreachable, match="too far"):
             await follow.reach((500, 0, 0))
+
+
+@virtual
+async def test_longer_motions_of_an_ultraarm_with_ramps_get_on_faster_and_rest_in_their_time() -> None:
+    family = BY_NAME["ultraarm"]
+    speeds: dict[float, float] = {}
+    for motion_time in (0.1, 0.4):
+        async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
+            sim.arm.device.place(family.joints)
+            r = Rig(family, sim, arm)
+            async with arm.following(motion_time=motion_time) as follow:
+                await kept(follow, r.beside(y=100), 2)
+                speeds[motion_time] = r.place[1] / 2
+                left = now()
+
+            await r.stands(within=max(0.0, left + 2 * motion_time - now()))
+            motions = [each for each in sim.arm.executed if each.command is ultraarm.MOVE_COORDS]
+            assert max(each.finished - each.started for each in motions) < 1.6 * motion_time
+            assert sim.arm.registers.powered
+            with pytest.raises(ValueError, match="motion_time must be"):
+                arm.following(motion_time=3)
+
+    assert speeds[0.4] > 2.5 * speeds[0.1]

@@ -28,19 +28,20 @@ def rows() -> dict[str, dict[str, Any]]:
 
 def test_a_magician_is_five_times_less_behind_than_with_each_target_queued(rows: dict[str, dict[str, Any]]) -> None:
     queued = rows["Magician, queued"]["lag_p50_ms"]
-    for way in ("Magician", "Magician, clear", "Magician, 50 %"):
+    for way in ("Magician", "Magician, clear", "Magician, 50 %", "Magician, workspace"):
         assert 5 * rows[way]["lag_p95_ms"] < queued
 
 
 def test_who_keeps_up_is_less_than_a_second_behind(rows: dict[str, dict[str, Any]]) -> None:
     for kind, row in rows.items():
-        if "queued" not in kind and kind != "ultraArm, ramps":
+        if "queued" not in kind and "ramps" not in kind.replace("no ramps", ""):
             assert 0 < row["lag_p5_ms"] <= row["lag_p95_ms"] < 1000, kind
             assert row["lag_p95_ms"] - row["lag_p5_ms"] < 500, kind
 
 
 def test_all_rest_within_a_moment_of_the_end(rows: dict[str, dict[str, Any]]) -> None:
-    assert all(row["rests_after_ms"] <= 200 for row in rows.values())
+    assert all(row["rests_after_ms"] <= 200 for kind, row in rows.items() if "0.5 s" not in kind)
+    assert rows["ultraArm, ramps, 0.5 s"]["rests_after_ms"] <= 1000
 
 
 @virtual

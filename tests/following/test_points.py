@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import pytest
@@ -114,7 +115,8 @@ def test_angles_that_nothing_tells_have_to_be_given() -> None:
 
 def trajectory(*points: tuple[float, Any], mm: float = 100.0, degrees: float = 90.0) -> Trajectory:
     here = TargetPoint((0.0,) * 6)
-    return Trajectory(points, lambda target: read_point(target, AXES, 6, here), mm=mm, degrees=degrees, turns=True)
+    read = partial(read_point, axes=AXES, joints=6, here=here)
+    return Trajectory(points, read, lambda start, end: None, mm=mm, degrees=degrees, turns=True)
 
 
 def test_a_trajectory_goes_straight_from_point_to_point_in_time() -> None:

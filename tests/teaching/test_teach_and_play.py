@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from contextlib import aclosing
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,8 +24,10 @@ from dobot_async.teaching import (
     TaughtStep,
     check_recording,
     from_json,
+    load_recording,
     play,
     released,
+    save_recording,
     to_json,
 )
 
@@ -499,3 +502,34 @@ async def test_an_arm_that_is_stopped_at_another_speed_gets_its_own_back() -> No
 
         await asyncio.sleep(1)
         assert await arm.request(c.GET_PTP_COMMON_PARAMS, None) == c.PTPCommonParams(70, 60)
+
+
+@pytest.mark.parametrize("suffix", ["json", "playback"])
+@virtual
+async def test_what_is_taught_and_saved_does_the_same_in_another_scene(tmp_path: Path, suffix: str) -> None:
+    file = tmp_path / f"carry.{suffix}"
+    taught_in, played_in = (Scene(pieces=[Piece("red", (250, 0)), Piece("blue", (250, -60))]) for _ in range(2))
+    async with simulate(scene=taught_in) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
+        recorder = Recorder(arm)
+        for start, end in (((250, 0), (200, 100)), ((250, -60), (160, 120))):
+            for (x, y), suck in ((start, True), (end, False)):
+                await arm.move_to(x, y, 20)
+                await recorder.point()
+                await arm.move_to(x, y, ON_TABLE)
+                await recorder.point(mode="line", pause=0.3)
+                await recorder.suction(suck)
+                await arm.move_to(x, y, 20)
+                await recorder.point(mode="line")
+
+        save_recording(recorder.recording, file)
+
+    recording = load_recording(file)
+    assert [step.suction for step in recording.steps] == [step.suction for step in recorder.recording.steps]
+    async with simulate(scene=played_in) as sim, Magician.connect(sim.url) as arm:
+        await arm.home()
+        await play(arm, recording)
+        assert not played_in.crashes
+        for name, place in (("red", (200, 100, -138)), ("blue", (160, 120, -138))):
+            assert taught_in.pieces[name].position == pytest.approx(place, abs=0.1)
+            assert played_in.pieces[name].position == pytest.approx(taught_in.pieces[name].position, abs=0.1)

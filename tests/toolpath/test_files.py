@@ -30,6 +30,7 @@ from dobot_async.toolpath import (
     trace_picture,
     write_text,
 )
+from dobot_async.toolpath.outlines import outlines
 
 CLOSE = 0.05  # mm
 PX = 25.4 / 96
@@ -379,3 +380,71 @@ def test_text_is_as_high_as_asked_and_stands_on_its_line() -> None:
 def test_text_that_cannot_be_written_is_refused(text: str, options: dict[str, object], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         write_text(text, **options)  # type: ignore[arg-type]
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.lists(st.lists(st.integers(0, 4), min_size=1, max_size=9), min_size=1, max_size=9), st.sampled_from([1, 3, 5, 7])
+)
+def test_outlines_are_closed_and_enclose_what_a_flood_finds(rows: list[list[int]], level: int) -> None:
+    """As many lines as there are spots and holes, by an independent flood fill of a picture enlarged by pixels."""
+    width = max(map(len, rows))
+    dark = np.array([[*row, *[0] * (width - len(row))] for row in rows]) / 4
+    lines = list(outlines(dark, level / 8))
+    assert all(line[0] == line[-1] and len(line) >= 4 for line in lines)
+    ends = [start for line in lines for start in line[:-1]]
+    assert len(set(ends)) >= len(ends) - 2 * len(lines)  # no way is gone twice
+    inside = np.array([[odd(lines, x + 0.5, y + 0.5) for x in range(width)] for y in range(len(rows))])
+    assert (inside == (dark >= level / 8)).all()
+
+
+def odd(lines: list[list[tuple[float, float]]], x: float, y: float) -> bool:
+    """Whether a place is enclosed, by the number of lines to its right."""
+    y += 1e-7
+    crossed = 0
+    for line in lines:
+        for (ax, ay), (bx, by) in pairwise(line):
+            if (ay > y) != (by > y) and x <= ax + (bx - ax) * (y - ay) / (by - ay):
+                crossed += 1
+
+    return crossed % 2 == 1
+
+
+@pytest.mark.parametrize("smooth", [0, 1.0])
+def test_outlines_are_where_a_rasteriser_was_told_to_draw(smooth: float) -> None:
+    """A disc and a slanting bar, drawn 16 times as fine and made small: 0.1 mm a pixel, found to half of that."""
+    fine, size = 16, (400, 300)
+    sheet = Image.new("L", (size[0] * fine, size[1] * fine), 255)
+    pen = ImageDraw.Draw(sheet)
+    disc, bar = ((120, 150), 80), [(240, 40), (380, 120), (360, 155), (220, 75)]
+    (cx, cy), r = disc
+    pen.ellipse([(cx - r) * fine, (cy - r) * fine, (cx + r) * fine, (cy + r) * fine], fill=0)
+    pen.polygon([(x * fine, y * fine) for x, y in bar], fill=0)
+    stream = io.BytesIO()
+    sheet.resize(size, Image.Resampling.BOX).save(stream, "PNG")
+    stream.seek(0)
+    path = trace_picture(stream, width=40, smooth=smooth)
+    circle = [(cx + r * math.cos(i / 500 * math.tau), cy + r * math.sin(i / 500 * math.tau)) for i in range(501)]
+    expected = [[(x / 10, 30 - y / 10) for x, y in line] for line in (circle, [*bar, bar[0]])]
+    assert len(path) == 2
+    assert apart(lines_of(path), expected) < (CLOSE if smooth == 0 else 2 * CLOSE)  # a blur rounds corners
+    assert path.points < 400
+
+
+def test_specks_are_left_out_and_holes_are_drawn() -> None:
+    sheet = Image.new("L", (60, 60), 255)
+    pen = ImageDraw.Draw(sheet)
+    pen.rectangle((10, 10, 49, 49), fill=0)
+    pen.rectangle((20, 20, 39, 39), fill=255)
+    pen.point((2, 2), fill=0)
+    for speckle, count in ((2, 2), (0, 3)):
+        stream = io.BytesIO()
+        sheet.save(stream, "PNG")
+        stream.seek(0)
+        path = trace_picture(stream, width=60, smooth=0, speckle=speckle)
+        assert len(path) == count
+        assert max(stroke.bounds.right for stroke in path) == pytest.approx(50)
+
+    for options, why in (({"smooth": 30}, "smooth"), ({"speckle": -1}, "speckle"), ({"threshold": 1}, "threshold")):
+        with pytest.raises(ValueError, match=why):
+            trace_picture(stream, **options)

@@ -109,7 +109,7 @@ def test_what_makes_no_picture_is_refused(options: dict[str, object]) -> None:
         ("svgelements", "read_svg(io.StringIO('<svg/>'))"),
         ("ezdxf", "read_dxf(io.StringIO(''))"),
         ("PIL", "read_picture(io.BytesIO())"),
-        ("potrace", "trace_picture(io.BytesIO())"),
+        ("numpy", "trace_picture(io.BytesIO())"),
         ("HersheyFonts", "write_text('a')"),
         ("PIL", "preview(Toolpath.of([(0, 0), (1, 1)])).png()"),
     ],
@@ -127,7 +127,7 @@ def test_a_missing_library_is_an_import_error_that_names_the_extra(library: str,
 
 
 def test_what_needs_no_library_works_without_the_extra() -> None:
-    missing = ("svgelements", "ezdxf", "PIL", "potrace", "HersheyFonts", "numpy")
+    missing = ("svgelements", "ezdxf", "PIL", "HersheyFonts", "numpy")
     program = (
         f"import io, sys; sys.modules.update(dict.fromkeys({missing!r}))\n"
         "from dobot_async.toolpath import *\n"

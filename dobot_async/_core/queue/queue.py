@@ -25,6 +25,7 @@ from dobot_async._core.queue.executor import Entry
 from dobot_async._core.queue.motion import WITHDRAWN, Motion
 from dobot_async._core.queue.stream import Steps, Stream, StreamStep
 from dobot_async._core.util.arguments import check_timeout
+from dobot_async._core.util.bounds import Bounds
 from dobot_async._core.util.tasks import STAYING
 from dobot_async.errors import (
     CommandRejected,
@@ -121,9 +122,10 @@ class MotionQueue(QueueCore):
             raise another(failure)
 
     @property
-    def kept(self) -> bool:
-        """Whether the arm was given a workspace to keep."""
-        return self._executor.keeper is not None
+    def bounds(self) -> Bounds | None:
+        """Where the tool may be, for who sends the arm about without the queue; None where nothing limits it."""
+        keeper = self._executor.keeper
+        return keeper.workspace if keeper else None
 
     async def _keep(self, motions: Sequence[Motion]) -> None:
         """Raise OutsideWorkspace, and send nothing, if one of several motions leads out of the arm's workspace."""

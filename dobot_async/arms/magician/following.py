@@ -6,7 +6,8 @@ clear:    QueuedCmdClear, Start, SetPTPCmd, queued   for firmware that does not 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from typing import Any, Literal, SupportsFloat
 
@@ -20,11 +21,14 @@ from dobot_async.arms.magician.frame import Frame
 from dobot_async.arms.magician.queue import MagicianQueue
 from dobot_async.arms.magician.status import SILENCE
 from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, FollowStatus, TargetPoint, follow_target
+from dobot_async.following.points import way_along
 
 __all__ = ["MagicianFollowing"]
 
 Way = Literal["replace", "clear"]
 MODES = {False: c.PTPMode.MOVJ_XYZ, True: c.PTPMode.MOVJ_ANGLE}
+STRAIGHT = {**MODES, False: c.PTPMode.MOVL_XYZ}
+STEP = 2.0  # degrees between two places of a way in joints
 
 
 class MagicianFollowing:
@@ -80,6 +84,7 @@ class MagicianStrategy:
     joints = 4
     turns = False
     replaces = True
+    settle: float = 0.0
     tolerance: tuple[float, float] = (0.5, 0.5)
     check_every: float = 0.25
 
@@ -88,6 +93,7 @@ class MagicianStrategy:
         self._executor = executor
         self._queue = queue
         self._go = self._replace if way == "replace" else self._clear_and_go
+        self._modes = MODES if queue.bounds is None else STRAIGHT  # ways that are looked at are straight
 
     def allow(self, point: TargetPoint) -> None:
         """Raise Unreachable, with the reason, for a place where the arm cannot go."""
@@ -96,6 +102,18 @@ class MagicianStrategy:
             kinematics.check_joints(*point.numbers)
         else:
             kinematics.check(*point.numbers)
+
+    def way(self, start: TargetPoint, end: TargetPoint) -> Sequence[tuple[float, ...]]:
+        """Return places on the way: the joints turn evenly, coordinates go straight."""
+        if not end.joints:
+            return start.numbers[:3], end.numbers[:3]
+
+        forward = self._queue.kinematics.forward
+        count = max(1, math.ceil(way_along(start, end)[1] / STEP))
+        return [
+            forward(*(a + (b - a) * step / count for a, b in zip(start.numbers, end.numbers, strict=True)))[:3]
+            for step in range(count + 1)
+        ]
 
     async def begin(self) -> None:
         """Note the arm's clock, by which it shows that it was switched off; raise ArmAlarm if it cannot move."""
@@ -115,7 +133,7 @@ class MagicianStrategy:
     async def go(self, point: TargetPoint) -> bool:
         """Send the arm there. Manual 2.11.5."""
         x, y, z, r = point.numbers
-        return await self._go(c.PTPCmd(MODES[point.joints], x, y, z, r))
+        return await self._go(c.PTPCmd(self._modes[point.joints], x, y, z, r))
 
     async def check(self) -> None:
         """Raise ArmAlarm for alarms, and MotionUnknown if the arm was switched off and on."""

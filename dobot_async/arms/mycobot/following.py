@@ -5,7 +5,7 @@ SetFreshMode 1 --> SendCoords, or SendAngles; GetCoords ... --> the stop --> Set
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from functools import partial
 from typing import SupportsFloat
@@ -17,6 +17,7 @@ from dobot_async.arms.mycobot.pose import AXES
 from dobot_async.arms.mycobot.queue import CobotQueue
 from dobot_async.errors import CommandRejected
 from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, FollowStatus, TargetPoint, follow_target
+from dobot_async.following.points import straight_way
 
 __all__ = ["CobotFollowing"]
 
@@ -80,6 +81,7 @@ class CobotStrategy:
 
     turns = True
     replaces = True
+    settle: float = 0.0
     check_every: float = 1.0
 
     def __init__(self, channel: Channel, runner: CobotRunner, tolerance: Tolerance, speed: int) -> None:
@@ -99,6 +101,10 @@ class CobotStrategy:
         check = model.check_joint if point.joints else model.check_coord
         for number, value in enumerate(point.numbers, 1):
             check(number, value)
+
+    def way(self, start: TargetPoint, end: TargetPoint) -> Sequence[tuple[float, ...]]:
+        """Return the ends of the way."""
+        return straight_way(start, end)
 
     async def begin(self) -> None:
         """Let the newest motion win."""

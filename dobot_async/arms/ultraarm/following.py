@@ -8,7 +8,7 @@ over within a moment: then the arm rests soon after the end, and no stop has to 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from typing import Any, SupportsFloat
 
@@ -20,14 +20,26 @@ from dobot_async.arms.ultraarm.queue import UltraArmQueue
 from dobot_async.arms.ultraarm.runner import UltraArmRunner
 from dobot_async.arms.ultraarm.status import STATUS_AND_ANGLES
 from dobot_async.errors import CommandRejected, MotionUnknown
-from dobot_async.following import MAX_SPEED, MAX_TURN, RATE, STALE, Follow, FollowStatus, TargetPoint, follow_target
-from dobot_async.following.points import apart, part_of_way
+from dobot_async.following import (
+    MAX_SPEED,
+    MAX_TURN,
+    RATE,
+    STALE,
+    Follow,
+    FollowStatus,
+    TargetPoint,
+    follow_target,
+    positive,
+)
+from dobot_async.following.points import apart, part_of_way, straight_way
 
 __all__ = ["UltraArmFollowing"]
 
 FIRST = 1.0  # mm or degrees of the first motion, of which nobody knows yet how long it takes
 LEAST = 0.3  # of any
-SHORT = 0.1  # seconds that each is to take
+SHORT = 0.1  # seconds that each is to take, unless told otherwise
+LONGEST = 2.0
+SETTLE = 2.0  # times as long as a motion is to take: by then the last one has ended
 SLOWEST, FASTEST = 1.0, 200.0  # F
 GRAIN = 0.02
 
@@ -47,11 +59,13 @@ class UltraArmFollowing:
         max_speed: SupportsFloat = MAX_SPEED,
         max_turn: SupportsFloat = MAX_TURN,
         stale: SupportsFloat = STALE,
+        motion_time: SupportsFloat = SHORT,
         constant_speed: bool = False,
     ) -> AbstractAsyncContextManager[Follow]:
         """Let the arm follow a target for the length of a block; at its end the arm comes to rest.
 
-        It goes in short motions of about 0.1 s, for nothing ends one: with ramps that is slow, a few mm/s to some tens.
+        It goes in short motions of about `motion_time`, for nothing ends one: with ramps that is slow, a few mm/s to
+        some tens.
         While it lasts commands are refused, those of the tools too, and jogs.
 
         Args:
@@ -59,6 +73,8 @@ class UltraArmFollowing:
             max_speed: mm/s, above 0; the arm's F is 1 to 200.
             max_turn: The same of e, and of joints: degrees/s.
             stale: Seconds after which the arm comes to rest if the target was not renewed.
+            motion_time: Seconds that each motion is to take, above 0 to 2. With ramps the arm gets on faster the longer
+                they are, and cuts corners more; after the block it goes on for so long, up to twice.
             constant_speed: Run without ramps (M16 S0), as the vendor's library does in programs, and put that back
                 after it (M16 S2). What it does to single motions nobody has measured.
 
@@ -75,6 +91,7 @@ class UltraArmFollowing:
             self._tolerance,
             to_float(max_speed, "max_speed"),
             to_float(max_turn, "max_turn"),
+            positive(motion_time, "motion_time", LONGEST),
             constant=bool(constant_speed),
         )
         return follow_target(
@@ -97,8 +114,12 @@ class UltraArmStrategy:
     replaces = False
     check_every: float = float("inf")  # each look tells errors
 
-    def __init__(self, runner: UltraArmRunner, tolerance: float, mm: float, degrees: float, *, constant: bool) -> None:
+    def __init__(
+        self, runner: UltraArmRunner, tolerance: float, mm: float, degrees: float, seconds: float, *, constant: bool
+    ) -> None:
         self.tolerance: tuple[float, float] = (tolerance, tolerance)
+        self.settle: float = SETTLE * seconds
+        self._seconds = seconds
         self._runner = runner
         self._constant = constant
         self._told = False
@@ -110,6 +131,10 @@ class UltraArmStrategy:
     def allow(self, point: TargetPoint) -> None:
         """Raise ValueError for a place that is beyond the limits."""
         self._runner.limits.check(command(point, None)[1])
+
+    def way(self, start: TargetPoint, end: TargetPoint) -> Sequence[tuple[float, ...]]:
+        """Return the ends of the way."""
+        return straight_way(start, end)
 
     async def begin(self) -> None:
         """Let coordinates be places; raise CommandRejected if the arm cannot move."""
@@ -137,7 +162,7 @@ class UltraArmStrategy:
             (sent_at, start), self._sent = self._sent, None
             length = apart(start, look.here) if start.joints == joints else 0.0
             if length > GRAIN:
-                self._length = max(LEAST, SHORT * length / (status.now() - sent_at))
+                self._length = max(LEAST, self._seconds * length / (status.now() - sent_at))
 
         return look
 
