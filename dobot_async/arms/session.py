@@ -5,20 +5,23 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
+from dobot_async._core.link.budget import check_budget
 from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.protocol.wire import Command
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_choice, check_duration, check_timeout
+from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.tasks import Cleanup, run_shielded
 from dobot_async._core.util.urls import hidden
+from dobot_async._core.util.workspace import Workspace, workspace_of
 from dobot_async.errors import ConnectFailed, DobotError, MotionStopped, ReplyTimeout
 from dobot_async.traces.recorder import RecordSettings, recorded
 from dobot_async.transports import open_transport
 
-__all__ = ["arm_session", "bounds_of", "check_options", "open_in_time", "run_owned"]
+__all__ = ["arm_session", "check_options", "open_in_time", "run_owned"]
 
 Q = TypeVar("Q")
 LEAST = 1.0
@@ -49,20 +52,38 @@ class Session(Protocol):
 S = TypeVar("S", bound=Session)
 
 
-def bounds_of(reply_timeout: float | tuple[float, float]) -> tuple[float, float]:
-    """Return the least and the most seconds until a request is sent again, given as one value or as both."""
-    return reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
+class CommonOptions(NamedTuple):
+    """What `connect` takes in all families, checked.
+
+    Attributes:
+        timeout: Seconds until an arm must have answered.
+        reply_timeout: The least and the most seconds until a request is sent again.
+        max_requests: A second; None for as many as the arm answers.
+        workspace: Where the tool may be.
+    """
+
+    timeout: float
+    reply_timeout: tuple[float, float]
+    max_requests: float | None
+    workspace: Workspace | None
 
 
-def check_options(queue: str, on_error: str, timeout: float, reply_timeout: float | tuple[float, float]) -> float:
-    """Check what `connect` takes in all families; return the timeout.
+def check_options(
+    queue: str,
+    on_error: str,
+    timeout: float,
+    reply_timeout: float | tuple[float, float],
+    max_requests: float | None = None,
+    workspace: Workspace | Box | Cylinder | None = None,
+) -> CommonOptions:
+    """Check what `connect` takes in all families.
 
     Raises:
         ValueError: Something is wrong.
     """
     check_choice("queue", queue, "fresh", "keep")
     check_choice("on_error", on_error, "stop", "leave")
-    floor, ceiling = bounds_of(reply_timeout)
+    floor, ceiling = reply_timeout if isinstance(reply_timeout, tuple) else (reply_timeout, reply_timeout)
     if not 0 < floor <= ceiling < float("inf"):
         raise ValueError(f"reply_timeout must be seconds, or (least, most), above 0 and finite, not {reply_timeout!r}")
 
@@ -70,7 +91,7 @@ def check_options(queue: str, on_error: str, timeout: float, reply_timeout: floa
     if not seconds:
         raise ValueError("timeout must be above 0 seconds: an arm needs some time to answer")
 
-    return seconds
+    return CommonOptions(seconds, (floor, ceiling), check_budget(max_requests), workspace_of(workspace))
 
 
 @asynccontextmanager

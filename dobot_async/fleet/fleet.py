@@ -30,7 +30,7 @@ from dobot_async.errors import MotionStopped, ReplyTimeout
 from dobot_async.fleet.cell import read_cell
 from dobot_async.fleet.concurrent import run_all
 from dobot_async.fleet.families import AnyArm
-from dobot_async.fleet.fleet_arm import Member, tell_to_stop
+from dobot_async.fleet.fleet_arm import Member
 from dobot_async.fleet.fleet_base import OnFailure
 from dobot_async.fleet.frames import BaseFrame, Place
 from dobot_async.fleet.programs import Programs
@@ -201,7 +201,9 @@ class Fleet(Programs[A]):
         if not fleet_arms:
             raise ValueError("a stop is a command, and these connections only read (control=False)")
 
-        tell_to_stop(fleet_arms)
+        for fleet_arm in fleet_arms:
+            fleet_arm.tell_to_stop()
+
         error = MotionStopped("the fleet was stopped")
         self._epoch = self._epoch.end(error)
         here().go_on(self._epoch)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from contextvars import ContextVar
 from typing import Any, cast
@@ -12,7 +12,7 @@ from typing import Any, cast
 from dobot_async._core.protocol.contract import LinkState
 from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
-from dobot_async._core.util.bounds import Bounds
+from dobot_async._core.util.bounds import ToolBounds
 from dobot_async._core.util.tasks import cancel_and_join
 from dobot_async.arms.base import Arm
 from dobot_async.errors import ConnectionLost, DobotError, MotionStopped
@@ -28,17 +28,11 @@ from dobot_async.fleet.turn import Turn
 from dobot_async.fleet.zone_locks import ZoneHolder, ZoneRequest
 from dobot_async.fleet.zones import Zones, here
 
-__all__ = ["FleetArm", "Member", "tell_to_stop"]
+__all__ = ["FleetArm", "Member"]
 
 
 recovering: ContextVar[FleetArm | None] = ContextVar("recovering", default=None)
 """The arm that is made ready again here: what that takes, such as power, passes though the arm is stopped."""
-
-
-def tell_to_stop(fleet_arms: Iterable[FleetArm]) -> None:
-    """Tells arms to stop before this returns, as far as their links can; `begin_stop` of each is to follow."""
-    for fleet_arm in fleet_arms:
-        fleet_arm.tell_to_stop()
 
 
 class FleetArm:
@@ -98,7 +92,7 @@ class FleetArm:
         return cast(FleetQueue, self.arm.queue)  # each class of `FleetFamily.kind` has one
 
     @property
-    def bounds(self) -> Bounds | None:
+    def bounds(self) -> ToolBounds | None:
         """The limits of the arm, if it has any and is guarded."""
         return self.guard.bounds if self.guard else None
 
@@ -241,7 +235,7 @@ class FleetArm:
             raise MotionStopped(f"{self.stopped}; the fleet stays stopped until fleet.recover()")
 
     def tell_to_stop(self) -> None:
-        """Writes a stop before this returns, if the link can; nobody waits for its answer."""
+        """Writes a stop before this returns, if the link can, unawaited; `begin_stop` is to follow."""
         if self._halting is not None:
             with suppress(DobotError):  # of a link that is gone everybody hears otherwise
                 self.arm.link.send_nowait(self._halting)

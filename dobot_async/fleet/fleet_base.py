@@ -17,7 +17,7 @@ from dobot_async._core.util.tasks import run_shielded
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.fleet.barriers import Barriers
 from dobot_async.fleet.concurrent import ended, on_the_way_out, with_arm_name
-from dobot_async.fleet.fleet_arm import FleetArm, Member, tell_to_stop
+from dobot_async.fleet.fleet_arm import FleetArm, Member
 from dobot_async.fleet.zone_locks import ZoneHolder
 from dobot_async.fleet.zones import Zones
 from dobot_async.traces.recorder import shared
@@ -78,7 +78,10 @@ class FleetBase(Generic[A]):
             yield
         except BaseException as error:
             self._leaving = True
-            tell_to_stop(fleet_arm for fleet_arm in self._fleet_arms.values() if fleet_arm.stops_on_error)
+            for fleet_arm in self._fleet_arms.values():
+                if fleet_arm.stops_on_error:
+                    fleet_arm.tell_to_stop()
+
             await on_the_way_out(error, ended(hosts))
             raise
 
@@ -131,7 +134,9 @@ class FleetBase(Generic[A]):
         self._barriers.fail(failed.name, str(error))
         affected = [fleet_arm for fleet_arm in self._affected(failed.name) if not fleet_arm.stopped]
         others = [fleet_arm for fleet_arm in affected if fleet_arm is not failed]
-        tell_to_stop(others)
+        for fleet_arm in others:
+            fleet_arm.tell_to_stop()
+
         if failed in affected:
             failed.stopped = MotionStopped(f"{failed.name} does not move, for it has failed: {error}")
 

@@ -18,7 +18,7 @@ from contextlib import asynccontextmanager
 from typing import Literal, TypeVar
 
 from dobot_async._core.queue.motion import Motion
-from dobot_async._core.util.bounds import Bounds
+from dobot_async._core.util.bounds import ToolBounds
 from dobot_async.fleet.frames import BaseFrame
 from dobot_async.fleet.limits import FleetLimits
 from dobot_async.fleet.planned_steps import PlannedStep, PlannedSteps, shifted
@@ -176,7 +176,7 @@ class Guard(ZoneTracker[S]):
         return why
 
     @property
-    def bounds(self) -> Bounds | None:
+    def bounds(self) -> ToolBounds | None:
         """The limits, for who sends the arm about without its queue; None if there are none."""
         return self._limits if self.is_limited else None
 

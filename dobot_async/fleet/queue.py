@@ -14,7 +14,7 @@ from dobot_async._core.queue.epoch import Epoch
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async._core.util.arguments import check_timeout
-from dobot_async._core.util.bounds import Bounds, both
+from dobot_async._core.util.bounds import ToolBounds, both
 from dobot_async.errors import DobotError
 from dobot_async.fleet.zones import here
 
@@ -25,7 +25,7 @@ class MotionGate(Protocol):
     """What a queue of the fleet reports to."""
 
     @property
-    def bounds(self) -> Bounds | None:
+    def bounds(self) -> ToolBounds | None:
         """Where the tool may be; None where the fleet does not limit it."""
         ...
 
@@ -61,7 +61,7 @@ class FleetQueue(MotionQueue):
     gate: MotionGate | None = None
 
     @property
-    def bounds(self) -> Bounds | None:
+    def bounds(self) -> ToolBounds | None:
         """Where the tool may be: in the arm's workspace, and within its limits in the fleet."""
         return both(super().bounds, self.gate.bounds if self.gate else None)
 

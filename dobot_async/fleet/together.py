@@ -23,7 +23,7 @@ from dobot_async._core.queue.motion import Motion
 from dobot_async.errors import MotionStopped, another
 from dobot_async.fleet.admission import admit_together, turns
 from dobot_async.fleet.concurrent import on_the_way_out, run_concurrently
-from dobot_async.fleet.fleet_arm import FleetArm, tell_to_stop
+from dobot_async.fleet.fleet_arm import FleetArm
 from dobot_async.fleet.zones import Zones
 
 __all__ = ["Start", "SynchronizedStart", "Together", "abandon"]
@@ -242,7 +242,9 @@ async def give_up(fleet_arms: Mapping[str, FleetArm]) -> list[str]:
     Returns:
         Of which arms it is not known whether they stand.
     """
-    tell_to_stop(fleet_arms.values())
+    for fleet_arm in fleet_arms.values():
+        fleet_arm.tell_to_stop()
+
     error = MotionStopped("the start of several arms together was given up")
     stops = [(fleet_arm, fleet_arm.begin_stop(another(error))) for fleet_arm in fleet_arms.values()]
     heard = await asyncio.gather(*(fleet_arm.stop_heard(stop) for fleet_arm, stop in stops))

@@ -7,7 +7,7 @@ place    --watch-->     the arm is inside, or the following ends, and with it th
 
 from __future__ import annotations
 
-from dobot_async._core.util.bounds import Bounds
+from dobot_async._core.util.bounds import ToolBounds
 from dobot_async.errors import CommandRejected
 from dobot_async.following.points import TargetPoint
 from dobot_async.following.strategy import Strategy
@@ -23,7 +23,7 @@ class Boundary:
         strategy: How the arm is led.
     """
 
-    def __init__(self, bounds: Bounds | None, strategy: Strategy) -> None:
+    def __init__(self, bounds: ToolBounds | None, strategy: Strategy) -> None:
         self._bounds = bounds
         self._strategy = strategy
         self._least: tuple[float, ...] = ()

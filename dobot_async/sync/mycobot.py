@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 from typing import Any, Literal, Self, SupportsFloat, TypeVar
 
 from dobot_async._core.protocol.wire import Command
-from dobot_async._core.util.bounds import Bounds
+from dobot_async._core.util.bounds import ToolBounds
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.workspace import Workspace
 from dobot_async.arms.info import DeviceInfo
@@ -95,7 +95,7 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
         return Motion(PORTAL.run(lambda: self.asynchronous.put(command, value, timeout=timeout)))
 
     @property
-    def bounds(self) -> Bounds | None:
+    def bounds(self) -> ToolBounds | None:
         """Where the tool may be, for who sends the arm about without the queue; None where nothing limits it."""
         return self.asynchronous.bounds
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Literal
 
-from dobot_async._core.util.bounds import Bounds
+from dobot_async._core.util.bounds import ToolBounds
 from dobot_async.toolpath.errors import UnreachableStroke
 from dobot_async.toolpath.plane import Place, WorkPlane
 from dobot_async.toolpath.stroke import Stroke
@@ -128,7 +128,7 @@ def from_point(moves: Sequence[ToolpathMove], point: float) -> list[ToolpathMove
 
 
 def check_moves(
-    moves: Iterable[ToolpathMove], reach: Reach, here: Place | None = None, bounds: Bounds | None = None
+    moves: Iterable[ToolpathMove], reach: Reach, here: Place | None = None, bounds: ToolBounds | None = None
 ) -> None:
     """Look at the reach every few mm of all moves, and at all of their ways in a workspace.
 

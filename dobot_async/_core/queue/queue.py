@@ -25,7 +25,7 @@ from dobot_async._core.queue.executor import Entry
 from dobot_async._core.queue.motion import WITHDRAWN, Motion
 from dobot_async._core.queue.stream import Steps, Stream, StreamStep
 from dobot_async._core.util.arguments import check_timeout
-from dobot_async._core.util.bounds import Bounds
+from dobot_async._core.util.bounds import ToolBounds
 from dobot_async._core.util.tasks import STAYING
 from dobot_async.errors import (
     CommandRejected,
@@ -122,7 +122,7 @@ class MotionQueue(QueueCore):
             raise another(failure)
 
     @property
-    def bounds(self) -> Bounds | None:
+    def bounds(self) -> ToolBounds | None:
         """Where the tool may be, for who sends the arm about without the queue; None where nothing limits it."""
         keeper = self._executor.keeper
         return keeper.workspace if keeper else None

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-__all__ = ["AllBounds", "Bounds", "both"]
+__all__ = ["AllBounds", "ToolBounds", "both"]
 
 
-class Bounds(Protocol):
+class ToolBounds(Protocol):
     """Where the tool of one arm may be; places are x, y, z in mm, as the arm itself tells them."""
 
     def check_way(self, places: Iterable[Sequence[float]]) -> None:
@@ -28,20 +28,20 @@ class Bounds(Protocol):
 class AllBounds:
     """Several of them, all of which count."""
 
-    each: tuple[Bounds, ...]
+    each: tuple[ToolBounds, ...]
 
     def check_way(self, places: Iterable[Sequence[float]]) -> None:
-        """See `Bounds`."""
+        """See `ToolBounds`."""
         line = list(places)
         for bounds in self.each:
             bounds.check_way(line)
 
     def excess(self, place: Sequence[float]) -> tuple[float, ...]:
-        """See `Bounds`."""
+        """See `ToolBounds`."""
         return tuple(excess for bounds in self.each for excess in bounds.excess(place))
 
 
-def both(one: Bounds | None, other: Bounds | None) -> Bounds | None:
+def both(one: ToolBounds | None, other: ToolBounds | None) -> ToolBounds | None:
     """Return what keeps to both; None if there is neither."""
     found = tuple(bounds for bounds in (one, other) if bounds is not None)
     return AllBounds(found) if len(found) > 1 else next(iter(found), None)

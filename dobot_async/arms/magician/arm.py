@@ -9,14 +9,13 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
 
-from dobot_async._core.link.budget import check_budget
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.protocol.transport import Transport
 from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async._core.util.shapes import Box, Cylinder
-from dobot_async._core.util.workspace import Workspace, workspace_of
+from dobot_async._core.util.workspace import Workspace
 from dobot_async.arms.keeping import kept_inside
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician import frame
@@ -38,7 +37,7 @@ from dobot_async.arms.magician.sensors import Sensors
 from dobot_async.arms.magician.trace_words import FRAMES
 from dobot_async.arms.magician.verbs import Verbs
 from dobot_async.arms.magician.wifi import WiFi
-from dobot_async.arms.session import arm_session, bounds_of, check_options, open_in_time, run_owned
+from dobot_async.arms.session import arm_session, check_options, open_in_time, run_owned
 from dobot_async.errors import DobotError, MotionStopped
 from dobot_async.traces.recorder import Record, RecordSettings
 
@@ -130,14 +129,11 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
             ValueError: The URL or an argument is wrong.
             ConnectFailed: No arm answered; the message says what to check.
         """
-        timeout = check_options(queue, on_error, timeout, reply_timeout)
-        budget = check_budget(max_requests)
-        kept = workspace_of(workspace)
+        common = check_options(queue, on_error, timeout, reply_timeout, max_requests, workspace)
         if not window >= 1:
             raise ValueError(f"window must be at least 1, not {window!r}")
 
-        floor, ceiling = bounds_of(reply_timeout)
-        reopen = partial(open_in_time, arm="magician", timeout=timeout)
+        reopen = partial(open_in_time, arm="magician", timeout=common.timeout)
 
         def build(transport: Transport, found: str) -> Magician:
             link: Link[frame.Frame] = Link(
@@ -148,21 +144,21 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
                 barriers=[frame.request(row, b"", queued=False) for row in BARRIERS],
                 filler=frame.FILLER,
                 read_only=not control,
-                round_trip=RoundTrip(floor, ceiling),
+                round_trip=RoundTrip(*common.reply_timeout),
                 reopen=partial(reopen, found) if reconnect else None,
-                max_requests=budget,
+                max_requests=common.max_requests,
             )
             return cls(
                 link,
                 window=min(window, transport.window),
                 check_reach=check_reach,
                 fresh=control and queue == "fresh",
-                workspace=kept,
+                workspace=common.workspace,
             )
 
-        recording = RecordSettings(record, FRAMES, "magician", (floor, ceiling))
+        recording = RecordSettings(record, FRAMES, "magician", common.reply_timeout)
         stop = control and on_error == "stop"
-        async with arm_session(url, timeout, reopen, build, stop_on_error=stop, recording=recording) as arm:
+        async with arm_session(url, common.timeout, reopen, build, stop_on_error=stop, recording=recording) as arm:
             assert isinstance(arm, cls)
             yield arm
 
@@ -229,9 +225,7 @@ class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
     async def set_end_effector(self, tool: c.EndEffectorParams, *, timeout: float | None = None) -> None:
         """Says which tool is on the arm: SuctionCup(), Gripper(), Pen(), Laser() or its own mm. Manual 2.9.1."""
         if not isinstance(tool, c.EndEffectorParams):
-            raise TypeError(
-                f"tool must be a SuctionCup(), Gripper(), Pen(), Laser() or EndEffectorParams, not {tool!r}"
-            )
+            raise TypeError(f"tool must be SuctionCup(), Gripper(), Pen(), Laser() or EndEffectorParams, not {tool!r}")
 
         await self.link.request(c.SET_END_EFFECTOR_PARAMS, tool, timeout=timeout)
         x, y, z = tool.x_bias, tool.y_bias, tool.z_bias

@@ -166,13 +166,10 @@ class Submission:
 
     def _confirm(self, request: Request[Frame], count: int, source: MotionSource, sent_since: int) -> bool:
         """Enter the commands before a checkpoint; return False if the arm did not take them all."""
-        if request.value is None or self.ledger.last is None:
+        if request.value is None or self.ledger.last is None or request.value[0] != self.ledger.last + count:
             return False
 
         index, left = request.value
-        if index != self.ledger.last + count:
-            return False
-
         self.space.room = max(self.space.room, left - sent_since)
         self._enter(self.ledger.acknowledge(index, count), source)
         return True

@@ -8,7 +8,6 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal, Self, TypeVar, cast
 
-from dobot_async._core.link.budget import check_budget
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.protocol.transport import Transport
@@ -16,7 +15,7 @@ from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async._core.queue.host import HostExecutor
 from dobot_async._core.util.arguments import check_duration, check_timeout
 from dobot_async._core.util.shapes import Box, Cylinder
-from dobot_async._core.util.workspace import Workspace, workspace_of
+from dobot_async._core.util.workspace import Workspace
 from dobot_async.arms.mycobot import commands as c
 from dobot_async.arms.mycobot import frame
 from dobot_async.arms.mycobot.channel import Channel
@@ -31,7 +30,7 @@ from dobot_async.arms.mycobot.queue import CobotQueue
 from dobot_async.arms.mycobot.readings import Readings
 from dobot_async.arms.mycobot.trace_words import frames_of
 from dobot_async.arms.mycobot.verbs import Verbs
-from dobot_async.arms.session import arm_session, bounds_of, check_options, run_owned
+from dobot_async.arms.session import arm_session, check_options, run_owned
 from dobot_async.errors import DobotError, MotionStopped, ReplyTimeout
 from dobot_async.traces.recorder import Record, RecordSettings
 
@@ -147,13 +146,10 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         """
         arm_model = model_of(model).limited(limits or {})
         reply_timeout = reply_times(url) if reply_timeout is None else reply_timeout
-        timeout = check_options(queue, on_error, timeout, reply_timeout)
+        common = check_options(queue, on_error, timeout, reply_timeout, max_requests, workspace)
         gap = check_duration(gap, "gap")
-        budget = check_budget(max_requests)
-        kept = workspace_of(workspace)
         check_tolerance(tolerance)
-        floor, ceiling = bounds_of(reply_timeout)
-        reopen = partial(opened, model=model, timeout=timeout, gap=gap)
+        reopen = partial(opened, model=model, timeout=common.timeout, gap=gap)
 
         def connected(transport: Transport, found: str) -> Link[frame.Frame]:
             return Link(
@@ -163,9 +159,9 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 url=url,
                 barriers=[frame.request(arm_model.row(row), b"", queued=False) for row in BARRIERS],
                 read_only=not control,
-                round_trip=RoundTrip(floor, ceiling),
+                round_trip=RoundTrip(*common.reply_timeout),
                 reopen=partial(reopen, found) if reconnect else None,
-                max_requests=budget,
+                max_requests=common.max_requests,
             )
 
         build = partial(
@@ -174,16 +170,16 @@ class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
             acknowledges=arm_model.acknowledges if acknowledges is None else acknowledges,
             tolerance=tolerance,
             fresh=control and queue == "fresh",
-            patience=floor,
-            workspace=kept,
+            patience=common.reply_timeout[0],
+            workspace=common.workspace,
         )
         async with arm_session(
             with_baud(url, arm_model.baud),
-            timeout,
+            common.timeout,
             reopen,
             lambda transport, found: build(connected(transport, found)),
             stop_on_error=control and on_error == "stop",
-            recording=RecordSettings(record, frames_of(arm_model), model, (floor, ceiling)),
+            recording=RecordSettings(record, frames_of(arm_model), model, common.reply_timeout),
         ) as arm:
             yield arm
             unsent = arm.queue.unsent

@@ -8,7 +8,6 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
 
-from dobot_async._core.link.budget import check_budget
 from dobot_async._core.link.link import Link
 from dobot_async._core.link.round_trip import RoundTrip
 from dobot_async._core.protocol.transport import Transport
@@ -17,8 +16,8 @@ from dobot_async._core.queue.host import HostExecutor
 from dobot_async._core.util.arguments import check_choice, check_duration
 from dobot_async._core.util.shapes import Box, Cylinder
 from dobot_async._core.util.tasks import STAYING
-from dobot_async._core.util.workspace import Workspace, workspace_of
-from dobot_async.arms.session import arm_session, bounds_of, check_options, run_owned
+from dobot_async._core.util.workspace import Workspace
+from dobot_async.arms.session import arm_session, check_options, run_owned
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.following import UltraArmFollowing
 from dobot_async.arms.ultraarm.frame import BARRIERS, Frame, Parser, encode
@@ -140,7 +139,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
             ValueError: The URL or an argument is wrong.
             ConnectFailed: No arm answered; the message says what to check.
         """
-        timeout = check_options(queue, on_error, timeout, reply_timeout)
+        common = check_options(queue, on_error, timeout, reply_timeout, max_requests, workspace)
         check_choice("on_stop", on_stop, "release", "finish")
         check_choice("pump", pump, "manual", "vendor")
         tolerance = check_duration(tolerance, "tolerance")
@@ -150,10 +149,7 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
         if home_switches is not None and (len(home_switches) != 3 or not {*home_switches} <= {0, 1}):
             raise ValueError(f"home_switches must be three of 0 and 1, or None, not {home_switches!r}")
 
-        budget = check_budget(max_requests)
-        kept = workspace_of(workspace)
-        floor, ceiling = bounds_of(reply_timeout)
-        reopen = partial(opened, timeout=timeout)
+        reopen = partial(opened, timeout=common.timeout)
 
         def build(transport: Transport, found: str) -> UltraArm:
             link = Link(
@@ -163,9 +159,9 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 url=url,
                 barriers=BARRIERS,
                 read_only=not control,
-                round_trip=RoundTrip(floor, ceiling),
+                round_trip=RoundTrip(*common.reply_timeout),
                 reopen=partial(reopen, found) if reconnect else None,
-                max_requests=budget,
+                max_requests=common.max_requests,
             )
             return cls(
                 link,
@@ -174,12 +170,12 @@ class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
                 tolerance=tolerance,
                 home_switches=home_switches,
                 on_stop=on_stop,
-                workspace=kept,
+                workspace=common.workspace,
             )
 
-        recording = RecordSettings(record, FRAMES, "ultraarm", (floor, ceiling))
+        recording = RecordSettings(record, FRAMES, "ultraarm", common.reply_timeout)
         stop = control and on_error == "stop"
-        async with arm_session(url, timeout, reopen, build, stop_on_error=stop, recording=recording) as arm:
+        async with arm_session(url, common.timeout, reopen, build, stop_on_error=stop, recording=recording) as arm:
             assert isinstance(arm, cls)
             yield arm
 

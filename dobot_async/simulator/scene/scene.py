@@ -73,8 +73,7 @@ class Scene:
         self._clock: Callable[[], float] = lambda: self._time
         self._speed = 1.0
         self._time = 0.0
-        self._busy = False
-        self._stirred = False
+        self._busy = self._stirred = False
         for piece in pieces:
             self.add(piece)
 

@@ -110,7 +110,7 @@ WRONG: dict[str, tuple[Attempt, type[Exception], str]] = {
         ValueError,
         "threshold must be 0 to 4095",
     ),
-    "tool": (lambda arm: arm.set_end_effector("suction"), TypeError, "tool must be a SuctionCup"),  # type: ignore[arg-type]
+    "tool": (lambda arm: arm.set_end_effector("suction"), TypeError, "tool must be SuctionCup"),  # type: ignore[arg-type]
     "color": (lambda arm: arm.wait_for_color("pink"), ValueError, "'red', 'green' or 'blue', not 'pink'"),
     "direction": (lambda arm: arm.jog("up", 1), ValueError, r"x\+ x- .* j4- l\+ l-, not 'up'"),
     "no word": (lambda arm: arm.jog(3, 1), TypeError, "direction must be a Jog"),  # type: ignore[arg-type]
