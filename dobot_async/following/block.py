@@ -94,7 +94,7 @@ async def follow_target(
     )
     motion = Motion(Unwatched(), Entry(FOLLOWING, None, None))
     motion.call = motion  # it need not be sent to be awaited
-    async with queue.roaming():
+    async with queue.unplanned_motion():
         await queue.update()
         with queue.led_by(motion):
             boundary = Boundary(queue.bounds, strategy)

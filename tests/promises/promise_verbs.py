@@ -46,7 +46,7 @@ INTERNAL = frozenset(
         "look",
         "note",
         "rest",
-        "roaming",
+        "unplanned_motion",
         "watch",
         "no_more_room",
         "write_on",

@@ -35,7 +35,7 @@ INTERNAL = frozenset(
         *("aclose", "attach", "begin_own_stop", "begin_stop", "beside", "cancel_writer", "count", "declared"),
         *("exclusively", "fail", "find_goal", "give_up", "goal", "greet", "kept", "leads_anywhere", "leave"),
         *("led_by", "look", "next", "note", "on_motion"),
-        *("no_more_room", "perform", "perform_from_goal", "planned", "prepare", "put_all", "rest", "roaming"),
+        *("no_more_room", "perform", "perform_from_goal", "planned", "prepare", "put_all", "rest", "unplanned_motion"),
         *("stopping", "stops_heard", "update", "watch", "watching", "write_on", "writer_ended"),
     )
 )

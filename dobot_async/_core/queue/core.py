@@ -148,7 +148,7 @@ class QueueCore:
         """Take note of how something ended that moves the arm."""
         self.outcomes["done" if error is None else type(error).__name__] += 1
 
-    def roaming(self) -> AbstractAsyncContextManager[None]:
+    def unplanned_motion(self) -> AbstractAsyncContextManager[None]:
         """While this is entered, the arm may go anywhere; in a fleet it waits until it may."""
         return nullcontext()
 
