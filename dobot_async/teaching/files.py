@@ -123,6 +123,9 @@ def made(kind: type[Any], read: object, name: str, place: str) -> Any:
 def load_recording(file: str | Path) -> Recording:
     """Read a recording: JSON, or a file of DobotStudio if its name ends with `.playback`.
 
+    Args:
+        file: Its path.
+
     Raises:
         RecordingFileError: Something in it is wrong.
         OSError: It cannot be read.
@@ -141,6 +144,10 @@ def load_recording(file: str | Path) -> Recording:
 
 def save_recording(recording: Recording, file: str | Path) -> None:
     """Write a recording: as JSON, or for DobotStudio if the file's name ends with `.playback`.
+
+    Args:
+        recording: What to write.
+        file: Its path; an older file stays until the new one is whole.
 
     Raises:
         ValueError: A `.playback` file cannot hold it; see `write_playback`.

@@ -96,6 +96,10 @@ class HandGuided:
 
         Args:
             mode: A pose when the key is released, or at intervals while it is held. Manual 2.7.
+
+        Raises:
+            ReplyTimeout: The arm does not answer in time.
+            ConnectionLost: The link is gone.
         """
         await self.link.request(c.SET_HHT_TRIG_MODE, mode)
         await self.link.request(c.SET_HHT_TRIG_OUTPUT_ENABLED, value=True)

@@ -118,7 +118,12 @@ class WiFi:
             await self._link.request(command, value, timeout=timeout)
 
     async def connected(self, *, timeout: float | None = None) -> bool:
-        """Returns whether the arm is in its network. Manual 2.18.8."""
+        """Returns whether the arm is in its network. Manual 2.18.8.
+
+        Raises:
+            ReplyTimeout: No answer came.
+            ConnectionLost: The link is gone.
+        """
         return await self._link.request(c.GET_WIFI_CONNECT_STATUS, None, timeout=timeout)
 
     async def wait_connected(self, timeout: float = 30.0) -> None:
