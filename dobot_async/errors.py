@@ -45,7 +45,7 @@ class DobotError(Exception):
             which; () for everything else.
     """
 
-    steps: tuple[Any, ...] = ()
+    steps: tuple[object, ...] = ()
 
 
 class ConnectFailed(DobotError, ConnectionError):

@@ -172,7 +172,7 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
 
 
 class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
-    """A myCobot or myArm; made by `connect`. Each verb returns when the arm has done it, and raises what `Arm` names.
+    """An arm behind a link; made by `connect`. Each verb returns when it is done, and raises what `Arm` names.
 
     A motion belongs to the call that waits for it: if that is cancelled, or its timeout passes, the arm stops.
     """

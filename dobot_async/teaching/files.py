@@ -30,7 +30,11 @@ LISTS: Mapping[str, type[TaughtStep | PathSample]] = {"steps": TaughtStep, "path
 
 
 def to_json(recording: Recording) -> str:
-    """Return the text of a file."""
+    """Return the text of a file.
+
+    Args:
+        recording: What to write.
+    """
     head = {"format": FORMAT, "version": VERSION, **given(recording, without={*LISTS, "remarks"})}
     lines = [json.dumps(head, ensure_ascii=False)[:-1]]
     for name in LISTS:

@@ -31,6 +31,9 @@ def released(arm: Arm) -> AbstractAsyncContextManager[None]:
 
     A myCobot holds again at the end, however the block ends. An ultraArm gets its power back, and has to be homed.
 
+    Args:
+        arm: A connected MyCobot or UltraArm.
+
     Raises:
         CommandRejected: Motions are under way; or, of an ultraArm at the end: it has not noticed where it was led.
         UnsupportedError: It is a Magician, which has a key for that; see `Recorder.from_key`.

@@ -16,6 +16,7 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.wire import Command
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame
 from dobot_async.errors import ReplyTimeout
 
 __all__ = ["WiFi", "WiFiSettings"]
@@ -48,7 +49,7 @@ class WiFiSettings:
 class WiFi:
     """An arm's Wi-Fi; `arm.wifi`. It needs the vendor's Wi-Fi module in the arm's serial socket."""
 
-    def __init__(self, link: Link[Any]) -> None:
+    def __init__(self, link: Link[Frame]) -> None:
         self._link = link
 
     async def get_settings(self, *, timeout: float | None = None) -> WiFiSettings:

@@ -218,7 +218,12 @@ class Verbs(Generic[T]):
         return self.perform(c.SET_ENCODERS, c.SetEncoders(encoders, speed), timeout)
 
     def wait(self, seconds: float, *, timeout: float | None = None) -> T:
-        """Hold the queue for a time, in seconds: 0 or more, and any fraction."""
+        """Hold the queue for a time.
+
+        Args:
+            seconds: 0 or more; fractions count.
+            timeout: Seconds.
+        """
         return self.perform(WAIT, seconds, timeout)
 
     def gripper(
