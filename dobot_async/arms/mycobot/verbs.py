@@ -36,8 +36,7 @@ class Verbs(Generic[T]):
     """What one can tell the arm to do; T is what each verb returns in its place. A speed is 1 to 100 percent.
 
     Raises:
-        ValueError: Of each verb: a number is out of range or beyond the model's limits, or the model does not know the
-            command; nothing was sent.
+        ValueError: Of each verb: a number is out of range, or the model has no such command; nothing was sent.
         TypeError: Something is of the wrong type.
     """
 
