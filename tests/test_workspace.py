@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual, virtual
 
 from dobot_async import (
@@ -192,7 +193,7 @@ async def perform(family: str, plan: Plan, workspace: Workspace | None) -> tuple
 
 
 @pytest.mark.parametrize("family", list(MODES))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(15), deadline=None)
 @given(plan=plans)
 def test_an_arm_never_leaves_its_workspace(family: str, plan: Plan) -> None:
     async def run() -> None:

@@ -11,6 +11,7 @@ import pytest
 from fake_executor import GO, LATENCY, SET, FakeExecutor, Step, now, queue_over
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual
 
 from dobot_async._core.queue.batch import BatchBuilder, batch
@@ -877,7 +878,7 @@ class Program:
 
 
 @given(st.lists(steps, max_size=25), st.sampled_from([1, 2, 1000]))
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 def test_any_program_is_sent_once_and_in_order_and_all_end(script: Any, capacity: int) -> None:
     async def scenario() -> None:
         executor = FakeExecutor(capacity)

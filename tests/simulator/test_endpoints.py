@@ -22,6 +22,7 @@ import anyio
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual, virtual
 
 from dobot_async import ConnectFailed, IOFunction, Magician
@@ -886,7 +887,7 @@ def carried(messages: Iterable[bytes], seed: int, pause: float, *, ordered: bool
     return arrived
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 @given(data=st.binary(min_size=1, max_size=50), seed=st.integers(0, 2**32))
 def test_each_fault_does_what_it_says(data: bytes, seed: int) -> None:
     def arrives(**faults: Any) -> list[bytes]:

@@ -19,6 +19,7 @@ from geometry import FILES, Line, apart, lines_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageChops, ImageDraw, ImageFilter, ImageOps
+from quick_suite import examples
 
 from dobot_async.toolpath import (
     Toolpath,
@@ -113,7 +114,7 @@ def test_units_of_a_page(width: str, mm: float) -> None:
     assert read_svg(io.StringIO(text)).bounds == pytest.approx((0, 0, mm, mm))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.complex_numbers(max_magnitude=100), min_size=4, max_size=4), st.floats(0.002, 1))
 def test_curves_are_missed_by_no_more_than_the_tolerance(controls: Sequence[complex], tolerance: float) -> None:
     data = "M{} {}C{} {} {} {} {} {}".format(*(f"{n:.4f}" for c in controls for n in (c.real, c.imag)))
@@ -222,7 +223,7 @@ def test_a_line_that_is_wrong_is_named(program: str, line: int, reason: str) -> 
     assert caught.value.place == f"line {line}"
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(st.text(st.sampled_from("GXYZIJRMSFN0123456789.-+ ();%\n\r\f\x85"), max_size=80))
 def test_any_text_is_a_program_or_names_a_line(text: str) -> None:
     found = wrong(lambda: read_gcode(io.StringIO(text)))

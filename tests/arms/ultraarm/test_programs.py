@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual
 
 from dobot_async import DobotError, UltraArm
@@ -124,7 +125,7 @@ def judge(program: Program) -> None:
             assert x in done
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(60), suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.lists(STEPS, min_size=1, max_size=12),
     st.sampled_from(["size", "ok", "nothing"]),
