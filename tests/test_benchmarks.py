@@ -28,6 +28,7 @@ LINE = 0.0032  # seconds that a CP command and its acknowledgement take at 11520
 POINTS, STEP, SPEED = 600, 0.5, 100.0
 
 
+@pytest.mark.cases(1)
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 @pytest.mark.parametrize("name", sorted(path.name for path in BENCHMARKS.glob("bench_*.py")))
 def test_runs_and_reports(name: str) -> None:
@@ -46,6 +47,7 @@ def test_runs_and_reports(name: str) -> None:
         assert row.get("junk", 0) % len(FILLER) == 0  # that is sent to an arm that somebody else keeps from answering
 
 
+@pytest.mark.full
 def test_all_are_written_down_and_drawn(tmp_path: Path) -> None:
     results = tmp_path / "RESULTS.md"
     results.write_text("# Results\n\n<!-- parser -->\nold\n<!-- end of parser -->\n\nWords.\n")

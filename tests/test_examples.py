@@ -237,11 +237,13 @@ def test_each_example_is_checked() -> None:
     assert {path.name for path in EXAMPLES.glob("*.py")} == set(CHECKS)
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("name", CHECKS)
 def test_example(name: str) -> None:
     CHECKS[name](run(name))
 
 
+@pytest.mark.full
 async def test_pick_and_place_sucks_and_lets_go_where_it_should() -> None:
     async with simulate(listen="tcp://127.0.0.1:0", speed=20) as sim:
         await asyncio.to_thread(run, "pick_and_place.py", sim.url)
@@ -269,6 +271,7 @@ async def test_io_and_conveyor_tells_what_the_world_puts_in() -> None:
     assert sum(ways) == 0
 
 
+@pytest.mark.full
 async def test_the_mirror_follows_a_hand_until_ctrl_c() -> None:
     async with (
         simulate(listen="tcp://127.0.0.1:0", speed=20) as leader,

@@ -82,6 +82,7 @@ asyncio.run(main())
     assert said == "90.0 [90.0]"
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -94,6 +95,7 @@ def test_one_line_makes_it_known_to_the_command_line(arguments: list[str], said:
     assert said in run(tmp_path, f"from dobot_async.cli.main import cli; cli({arguments!r})")
 
 
+@pytest.mark.full
 def test_one_line_makes_it_known_to_the_search(tmp_path: Path) -> None:
     said = run(
         tmp_path, "from dobot_async.discovery.families import FAMILIES; print(*[each.name for each in FAMILIES])"

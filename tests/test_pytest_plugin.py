@@ -145,24 +145,29 @@ def passed(ran: subprocess.CompletedProcess[str]) -> int:
     return int(found[1])
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("mode", ["auto", "strict"])
 def test_both_modes_of_pytest_asyncio(tmp_path: Path, mode: str) -> None:
     assert passed(run(tmp_path, SUITE, "--asyncio-mode", mode)) == 4
 
 
+@pytest.mark.full
 def test_arms_stand_in_the_scene_of_the_suite(tmp_path: Path) -> None:
     assert passed(run(tmp_path, SCENE_SUITE)) == 6
 
 
+@pytest.mark.full
 def test_all_families_are_served(tmp_path: Path) -> None:
     assert passed(run(tmp_path, FAMILIES_SUITE)) == 4
 
 
+@pytest.mark.full
 def test_auto_mode_needs_no_mark(tmp_path: Path) -> None:
     suite = "async def test_unmarked(simulated_arm):\n    assert simulated_arm.url\n"
     assert passed(run(tmp_path, suite, "--asyncio-mode", "auto", "-p", "no:anyio")) == 1
 
 
+@pytest.mark.full
 def test_the_page_is_a_test_suite(tmp_path: Path) -> None:
     blocks = re.findall(r"^```python\n((?:.*\n)*?)```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
     suite = "\n\n".join(blocks)
@@ -211,6 +216,7 @@ async def test_a_misspelt_setting(simulate_arm):
     assert "simulate_arm takes no spede; it is dobot(listen=" in ran.stdout
 
 
+@pytest.mark.full
 def test_the_seed_is_the_tests_own_and_told_when_it_fails(tmp_path: Path) -> None:
     suite = """
 import pytest

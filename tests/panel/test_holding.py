@@ -288,6 +288,7 @@ async def test_a_stop_may_be_said_again_and_again() -> None:
         assert sum("stops the arm" in each["text"] for each in viewer.of("log")) == 1
 
 
+@pytest.mark.full
 async def test_a_bad_line_and_a_page_that_comes_and_goes_leave_no_motion_without_a_hand() -> None:
     """An hour of it, in virtual time, with 2 percent of all messages lost."""
     async with (

@@ -89,6 +89,7 @@ def programs() -> Mapping[tuple[str, str], Program]:
     return asyncio.run(run_all())
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("call", CALLS)
 @pytest.mark.parametrize("family", [family.name for family in FAMILIES])
 def test_an_interrupt_on_a_dead_line_is_a_keyboard_interrupt(

@@ -171,6 +171,7 @@ async def test_update_tells_without_anybody_who_waits() -> None:
         assert motion.ended
 
 
+@pytest.mark.full
 async def test_what_nobody_awaits_fills_no_memory() -> None:
     executor = FakeExecutor(capacity=10)
     async with queue_over(executor) as queue:

@@ -78,6 +78,7 @@ async def test_who_is_read_first_decides_nothing(first: str) -> None:
     assert scene.pieces["red"].on == "tool of left"
 
 
+@pytest.mark.full
 @virtual
 async def test_arms_of_two_families_share_a_scene() -> None:
     """The ultraArm stands on something, so that the table is 62 mm below its origin."""

@@ -555,6 +555,7 @@ def test_the_hook_may_clear_while_another_ends() -> None:
     assert bench.names == [("jog", "aborted"), ("wait", "aborted")]
 
 
+@pytest.mark.full
 def test_ten_thousand_points() -> None:
     bench = Bench()
     device = bench.device

@@ -1443,6 +1443,7 @@ def test_watching_changes_nothing(looks: list[tuple[float, Callable[[Bench], Any
     assert watched.arm.pose == alone.arm.pose
 
 
+@pytest.mark.full
 def test_ten_thousand_points() -> None:
     bench = Bench()
     bench.move(c.PTPMode.MOVJ_XYZ, 260, 0, 0)

@@ -68,6 +68,7 @@ def by_svgpathtools(name: str, scale: float, height: float, start: tuple[float, 
     return found
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("name", "scale", "height"), [("shapes.svg", 0.5, 80.0), ("paths.svg", PX, 100 * PX)])
 def test_svg_is_what_svgpathtools_reads(name: str, scale: float, height: float) -> None:
     assert apart(lines_of(read_svg(FILES / name)), by_svgpathtools(name, scale, height)) < CLOSE

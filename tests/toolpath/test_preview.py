@@ -103,6 +103,7 @@ def test_what_makes_no_picture_is_refused(options: dict[str, object]) -> None:
         preview(Toolpath())
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("library", "call"),
     [

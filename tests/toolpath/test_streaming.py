@@ -66,6 +66,7 @@ def halts(records: list[Executed], row: object) -> list[tuple[int, float]]:
     ]
 
 
+@pytest.mark.full
 @virtual
 async def test_ten_thousand_points_with_a_pen() -> None:
     path = rings(10_000, 20)

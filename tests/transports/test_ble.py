@@ -1113,6 +1113,7 @@ async def test_no_motion_is_lost_or_doubled_wherever_the_link_breaks(
         assert arm.link.outages == 1
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(2))
 async def test_a_link_that_breaks_again_and_again(module: BleModule, sim: Simulation, seed: int) -> None:
     """Forty motions, and a break after every few steps on the way, whatever they are."""

@@ -185,6 +185,7 @@ async def test_an_arm_that_has_nothing_to_do_for_days_was_not_switched_off(days:
         assert targets(sim)[1:] == [(200 + step, 0) for step in range(20)]
 
 
+@pytest.mark.full
 @virtual
 async def test_an_arm_that_is_paused_was_not_switched_off() -> None:
     async with simulate() as sim, Magician.connect(sim.url) as arm:

@@ -159,6 +159,7 @@ def test_any_program(steps: list[tuple[str, int, float]], acknowledge: Any, dept
     run_virtual(run())
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("first", [160, 180, 240, 260, 340])
 def test_late_replies_on_a_line_that_loses_some_make_no_motion_done(first: int) -> None:
     """A reply that comes alone may acknowledge another command, or tell of another time: the goals tell.
