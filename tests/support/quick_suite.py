@@ -17,6 +17,7 @@ The choice depends on names and parameters alone: it is the same in every proces
 
 from __future__ import annotations
 
+import os
 import zlib
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
@@ -39,6 +40,16 @@ hypothesis.settings.register_profile(FULL, deadline=None)
 def examples(number: int) -> int:
     """How many examples a property tries in the suite at hand, for its number in the full one."""
     return max(min(number, FEWEST_EXAMPLES), number * hypothesis.settings.default.max_examples // 100)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int | None:
+    """Returns how many processes `-n auto` are: half as many again as there are cores, for many tests wait."""
+    if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ:
+        return None
+
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cores + cores // 2
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
