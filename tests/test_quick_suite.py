@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -126,7 +127,7 @@ def test_the_first_the_last_and_some_between(number: int, limit: int) -> None:
     assert chosen[0] == 0
     assert limit == 1 or chosen[-1] == number - 1
     if limit > 2:
-        gaps = [after - before for before, after in zip(chosen, chosen[1:], strict=False)]
+        gaps = [after - before for before, after in pairwise(chosen)]
         assert max(gaps) <= number * 0.62 + 1
 
 
