@@ -11,7 +11,7 @@
 # make sync      writes the blocking classes out of the asynchronous ones again
 # make lerobot   the contract tests of integrations/, with LeRobot but without what only its training needs
 # make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|lost|stops]
-# make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
+# make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test-full tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 
 PYTHON ?= python3

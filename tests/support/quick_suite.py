@@ -39,7 +39,7 @@ hypothesis.settings.register_profile(FULL, deadline=None)
 
 def examples(number: int) -> int:
     """How many examples a property tries in the suite at hand, for its number in the full one."""
-    return max(min(number, FEWEST_EXAMPLES), number * hypothesis.settings.default.max_examples // 100)
+    return max(min(number, FEWEST_EXAMPLES), number * hypothesis.settings().max_examples // 100)
 
 
 @pytest.hookimpl(optionalhook=True)
