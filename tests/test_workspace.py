@@ -514,3 +514,11 @@ def test_a_straight_way_that_passes_is_inside_everywhere(
         came_in = list(itertools.dropwhile(lambda place: bad(place, 0.05), line))
         assert came_in
         assert not any(bad(place, 0.1) for place in came_in)
+
+
+def test_out_of_a_thin_wall_an_arm_may_go_back_and_not_through() -> None:
+    """Both ends of a way may be less deep than its middle: it is looked at every few millimetres."""
+    wall = Workspace(forbidden=Box((100, 130), (-200, 200), (0, 200)))
+    wall.check_way([(110, 0, 50), (90, 0, 50)])
+    with pytest.raises(OutsideWorkspace, match="through Box"):
+        wall.check_way([(110, 0, 50), (140, 0, 50)])
