@@ -62,6 +62,7 @@ def run(where: Path, program: str) -> str:
     return ran.stdout.strip()
 
 
+@pytest.mark.full
 def test_one_line_gives_it_its_public_name_and_its_simulator(tmp_path: Path) -> None:
     said = run(
         tmp_path,
@@ -103,6 +104,7 @@ def test_one_line_makes_it_known_to_the_search(tmp_path: Path) -> None:
     assert said == "magician mycobot ultraarm turntable"
 
 
+@pytest.mark.full
 def test_a_place_whose_part_is_missing_refuses_it_by_name(tmp_path: Path) -> None:
     said = run(
         tmp_path,

@@ -174,6 +174,7 @@ def test_the_page_is_a_test_suite(tmp_path: Path) -> None:
     assert passed(run(tmp_path, suite)) == suite.count("async def test_") > 0
 
 
+@pytest.mark.full
 def test_without_pytest_asyncio_the_arms_say_what_is_missing(tmp_path: Path) -> None:
     suite = "def test_other(): pass\n\ndef test_arm(simulated_arm): pass\n"
     hidden = "import sys\nsys.modules['pytest_asyncio'] = None\n"
@@ -184,6 +185,7 @@ def test_without_pytest_asyncio_the_arms_say_what_is_missing(tmp_path: Path) -> 
     assert "pip install pytest-asyncio" in ran.stdout
 
 
+@pytest.mark.full
 def test_a_wrong_mark_is_told(tmp_path: Path) -> None:
     suite = """
 import pytest
@@ -231,10 +233,12 @@ async def test_arm(faulty_arm, case):
     assert seeds == [str(zlib.crc32(f"test_application.py::test_arm[{case}]".encode())) for case in (1, 2)]
 
 
+@pytest.mark.full
 def test_the_mark_is_listed(tmp_path: Path) -> None:
     assert "@pytest.mark.dobot(listen=..." in run(tmp_path, "", "--markers").stdout
 
 
+@pytest.mark.full
 def test_loading_the_plugin_brings_in_nothing_that_is_not_used_yet(tmp_path: Path) -> None:
     suite = """
 import sys

@@ -204,7 +204,7 @@ def test_an_arm_never_leaves_its_workspace(family: str, plan: Plan) -> None:
     run_virtual(run())
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("family", list(MODES))
 @virtual
 async def test_without_a_workspace_the_same_motions_leave_it(family: str) -> None:
@@ -217,7 +217,7 @@ async def test_without_a_workspace_the_same_motions_leave_it(family: str) -> Non
     assert not all(inside(space, place) for place in places)
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("family", list(MODES))
 @pytest.mark.parametrize("direction", ["y-", "y+", "j1-"])
 @virtual

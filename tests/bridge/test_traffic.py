@@ -96,7 +96,7 @@ def assert_as_good(served: Seen, own: Seen) -> None:
     assert not served.figures.failures["ConnectionLost"]
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.usefixtures("virtual_ports")
 @pytest.mark.parametrize("what", ["blip", "loss", "stalled", "silent", "break"])
 def test_a_magician_is_served_as_well_as_by_the_bare_line(what: str) -> None:
@@ -115,7 +115,7 @@ def test_by_whichever_way_and_however_many_they_are(listen: str, programs: int) 
     assert_as_good(seen(partial(through_a_bridge, listen=listen), "magician", "loss", programs), own)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.usefixtures("virtual_ports")
 @pytest.mark.parametrize("family", ["mycobot280", "ultraarm"])
 @pytest.mark.parametrize("what", ["blip", "loss", "break"])

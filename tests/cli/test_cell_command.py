@@ -101,6 +101,7 @@ def places(sim: Simulation) -> list[tuple[float, float]]:
     return [(each.value.x, each.value.y) for each in sim.arm.executed if each.command is c.SET_PTP_CMD]
 
 
+@pytest.mark.full
 async def test_status_tells_all_in_the_frame_of_the_cell(file: Path) -> None:
     code, output, errors = await run("--json", "cell", file, "status")
     assert (code, errors) == (0, "")

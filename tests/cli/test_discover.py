@@ -247,6 +247,7 @@ def test_wrong_usage_sets_nothing_up(arguments: list[str], text: str | bytes, me
     assert message in done.stderr
 
 
+@pytest.mark.full
 async def test_a_terminal_is_asked_and_does_not_show_the_password(on_usb: Simulation) -> None:
     master, slave = os.openpty()
     program = "import os, sys; os.login_tty(0); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"

@@ -277,7 +277,7 @@ async def test_the_way_from_where_the_arm_stands_names_the_stroke_and_nothing_mo
     assert not [each for each in sim.arm.executed if each.command in {m.SET_PTP_CMD, m.SET_CP_CMD}]
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("library", "arguments"),
     [
@@ -413,6 +413,7 @@ async def test_ctrl_c_of_a_pen_draws_the_stroke_again_from_its_start(cross: str)
         assert len(lines_drawn(sim)) - before in {3, 4}
 
 
+@pytest.mark.full
 async def test_an_alarm_is_exit_code_1_and_tells_the_rest(cross: str) -> None:
     async with simulate(listen="tcp://127.0.0.1:0", speed=2) as sim:
         process = await start("--json", "--url", sim.url, "engrave", cross, *AT)

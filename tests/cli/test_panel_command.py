@@ -182,6 +182,7 @@ def test_wrong_usage_is_told(arguments: list[str], said: str, tmp_path: Path, mo
     assert said in done.output
 
 
+@pytest.mark.full
 async def test_a_taken_port_is_a_failure_in_one_line() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         async with started("--url", "sim:", "panel", "--port", str(taken.getsockname()[1])) as process:

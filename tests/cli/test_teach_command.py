@@ -237,6 +237,7 @@ async def test_a_signal_stops_the_arm_and_keeps_what_was_taken(
     assert len(load_recording(tmp_path / "part.json").steps) == 1
 
 
+@pytest.mark.full
 async def test_it_cannot_be_suspended_by_a_key_while_the_arm_moves(sim: Simulation, tmp_path: Path) -> None:
     """Ctrl-Z and Ctrl-S, which would leave nobody to stop the arm, are keys as any other; Ctrl-C is what it is."""
     async with taught(sim, tmp_path / "part.json", shell=True) as at:
@@ -466,6 +467,7 @@ async def test_an_ultraarm_that_notices_nothing_leaves_no_file(tmp_path: Path) -
 TWO = (TaughtStep((220, 0, 40, 0)), TaughtStep((220, 60, 40, 0)))
 
 
+@pytest.mark.full
 async def test_a_file_is_played(tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     save_recording(Recording("magician", steps=TWO), file)
@@ -533,7 +535,7 @@ async def test_a_playback_file_is_played_and_what_is_not_known_in_it_is_told(sim
     assert "item_13" in errors
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -377,7 +377,7 @@ ENDS: dict[str, tuple[str, Callable[[list[str]], bool]]] = {
 }
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ENDS)
 async def test_a_program_that_does_not_close_ends_as_it_should(name: str) -> None:
     """What was queued is done after a normal end; after an error the arm stops, whatever other threads still do."""

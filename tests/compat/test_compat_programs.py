@@ -26,7 +26,7 @@ def test_one_import_is_changed(program: str) -> None:
     assert text.count("dobot_async") == 1
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @programs
 async def test_every_part_is_where_it_belongs(program: str) -> None:
     job = JOBS[program]
@@ -46,7 +46,7 @@ async def test_a_lost_reply_changes_nothing(program: str) -> None:
     job.check(ended.scene)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @programs
 async def test_an_alarm_is_raised(program: str) -> None:
     """The program ends with what the alarm is, and the arm makes no motion after it."""

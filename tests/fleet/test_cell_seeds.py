@@ -34,6 +34,7 @@ def test_a_seed_of_a_stop(seed: int) -> None:
     scenario_of_stops.run_seed(seed)
 
 
+@pytest.mark.full
 def test_the_monitor_sees_what_happens_without_the_guard() -> None:
     with pytest.raises(scenario_of_guards.Violation, match="are in zone"):
         for seed in range(20):

@@ -189,7 +189,7 @@ async def jogs_of_families(fleet: Fleet[Any]) -> None:
     await fleet.run({name: jog(name, directions) for name, directions in DIRECTIONS.items()})
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("scenario", [of_families, jogs_of_families], ids=lambda scenario: scenario.__name__)
 def test_families_at_each_step(scenario: Scenario) -> None:
     @virtual

@@ -145,7 +145,7 @@ async def test_a_question_with_two_replies_is_asked_again_and_the_guard_stays() 
             assert len(wire.times(TIME.id)) == sent + 2
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(3))
 async def test_who_gives_up_early_leaves_nothing_for_who_comes_next(seed: int) -> None:
     wire = StragglingLine(Random(seed), 70)

@@ -170,7 +170,7 @@ async def test_a_server_that_is_killed_leaves_it_to_the_bridge_to_stop_the_arm()
         await stands(sim)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 async def test_a_signal_ends_it_whatever_its_client_does(number: signal.Signals) -> None:
     async with simulate(listen=TCP, speed=1) as sim, served(sim.url, "--allow-motion") as talk:

@@ -77,6 +77,7 @@ def test_what_is_imported_is_declared() -> None:
     assert not missing, "declare it, as a dependency or in an extra"
 
 
+@pytest.mark.full
 def test_what_is_declared_is_imported() -> None:
     unused = CORE.union(*OPTIONAL.values()) - third_party().keys()
     assert not unused, "no module of the package imports it"

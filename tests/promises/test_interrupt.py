@@ -26,7 +26,7 @@ CHILD = Path(__file__).with_name("promise_child.py")
 SLOW = 0.1
 LIMIT = 30.0  # real seconds; only so that nothing hangs
 
-pytestmark = pytest.mark.timeout(120)
+pytestmark = [pytest.mark.timeout(120), pytest.mark.full]
 
 
 @dataclass(frozen=True)

@@ -221,6 +221,7 @@ async def test_the_arm_is_where_its_mount_says() -> None:
     assert place(scene.pieces["red"]) == (1000, 350, 0)
 
 
+@pytest.mark.full
 @virtual
 async def test_an_arm_on_no_rail_stays_where_it_stands() -> None:
     """Whatever its program says of a rail."""
@@ -235,6 +236,7 @@ async def test_an_arm_on_no_rail_stays_where_it_stands() -> None:
     assert scene.pieces["red"].on == "tool of"
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("mount", "at"), [(Mount(), (250, 0)), (Mount(rail_yaw=90), (250, 120))])
 @virtual
 async def test_an_arm_that_nobody_homed_goes_beside(mount: Mount, at: tuple[float, float]) -> None:

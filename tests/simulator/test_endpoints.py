@@ -290,7 +290,7 @@ async def test_unplug_forgets_half_a_datagram_stream_and_what_is_on_the_way(hear
         assert (await ask(transport, GET_POSE, POSE_REPLY))[3] == GET_POSE[3]
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @everywhere
 async def test_nothing_is_left(listen: str, heard: bytearray) -> None:
     """Neither by a simulation that nobody used, nor with clients and messages on the way."""

@@ -26,7 +26,7 @@ from typing import Any
 import hypothesis
 import pytest
 
-CASES = 6
+CASES = 4
 QUICK_EXAMPLES = 15
 FEWEST_EXAMPLES = 5
 GOLDEN = 0.618  # steps of this part of the whole fall evenly, however many they are

@@ -141,6 +141,7 @@ async def test_the_end_of_the_program_stops_the_arm_of_a_daemon_thread() -> None
         stands(sim)
 
 
+@pytest.mark.full
 async def test_sigterm_stops_the_arm_that_another_thread_drives_and_that_thread_ends() -> None:
     body = f"""
         def work():
@@ -179,6 +180,7 @@ async def test_a_program_that_handles_sigterm_itself_is_left_alone() -> None:
         assert code == 7
 
 
+@pytest.mark.full
 async def test_after_the_last_block_signals_and_threads_are_as_before() -> None:
     body = """
         before = [signal.getsignal(each) for each in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT)]

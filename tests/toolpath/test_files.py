@@ -280,6 +280,7 @@ def test_what_is_wrong_in_svg_is_named_with_its_line(body: str, reason: str) -> 
     assert caught.value.place == "line 3"
 
 
+@pytest.mark.full
 def test_uses_that_multiply_are_refused() -> None:
     bombs = "".join(f'<g id="g{n}">{f"""<use href="#g{n + 1}"/>""" * 10}</g>' for n in range(8))
     bombs += '<g id="g8"><path d="M0 0H1"/></g>'

@@ -84,6 +84,7 @@ async def test_ten_thousand_points_with_a_pen() -> None:
         assert len(told) >= 15
 
 
+@pytest.mark.full
 @virtual
 async def test_a_laser_never_halts_at_all() -> None:
     path = rings(1_000, 4)

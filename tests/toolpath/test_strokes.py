@@ -198,6 +198,7 @@ def test_a_comb_is_drawn_to_and_fro() -> None:
     assert teeth.order(start=(0, 60)).strokes[0].start == (0, 50)
 
 
+@pytest.mark.full
 def test_thousands_of_strokes_are_ordered_well() -> None:
     random = np.random.default_rng(1)
     path = Toolpath.of(*[[(x, y), (x + 1, y)] for x, y in random.uniform(0, 200, (3000, 2)).tolist()])

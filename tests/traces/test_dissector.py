@@ -98,7 +98,7 @@ WAYS: dict[str, Way] = {
 }
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("model", PROTOS)
 def test_each_frame_is_found(model: str, way: str, lua: Path, said: dict[str, list[Said]], tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_each_frame_is_found(model: str, way: str, lua: Path, said: dict[str, li
         assert [str(int(each, 0)) for each in found] == ids
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("way", ["tcp", "udp", "usb"])
 def test_values_and_roles_are_told(way: str, lua: Path, said: dict[str, list[Said]], tmp_path: Path) -> None:
     packets = tshark(lua, write_pcap(tmp_path / "a.pcap", *WAYS[way]("magician", said["magician"])))

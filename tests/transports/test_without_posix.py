@@ -104,6 +104,7 @@ asyncio.run(main())
     assert message in printed
 
 
+@pytest.mark.full
 def test_the_command_line_needs_none_of_it() -> None:
     program = """
 from dobot_async.cli.main import cli

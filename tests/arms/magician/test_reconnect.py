@@ -170,6 +170,7 @@ async def test_nothing_is_done_that_an_arm_was_told_before_it_was_switched_off()
                 await motion
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("days", [0.01, 10, 49.7, 120])
 @virtual
 async def test_an_arm_that_has_nothing_to_do_for_days_was_not_switched_off(days: float) -> None:
