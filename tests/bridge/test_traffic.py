@@ -107,7 +107,7 @@ def test_a_magician_is_served_as_well_as_by_the_bare_line(what: str) -> None:
     assert served.done >= 0.8 * own.done > 0
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.usefixtures("virtual_ports")
 @pytest.mark.parametrize(("listen", "programs"), [("ws://127.0.0.1:0", 5), ("tcp://127.0.0.1:0", 15)])
 def test_by_whichever_way_and_however_many_they_are(listen: str, programs: int) -> None:

@@ -100,7 +100,7 @@ async def test_json_is_one_object_with_a_made_up_token(sim: Simulation) -> None:
         assert (process.returncode, output, errors) == (143, b"", b"")
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("source", ["environment", "file"])
 async def test_a_token_of_ones_own_is_not_printed(sim: Simulation, source: str, tmp_path: Path) -> None:
     file = tmp_path / "token"
@@ -126,7 +126,7 @@ def test_a_file_without_a_token_is_named(text: bytes, tmp_path: Path) -> None:
     assert f"{file} has no token" in done.stderr
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [

@@ -167,7 +167,7 @@ async def test_what_the_guard_refuses_under_way_is_a_failure_and_not_wrong_usage
     assert errors.startswith("error: left, line 3 (move 200 180 20): ")
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("lines", "number"),
     [

@@ -114,7 +114,7 @@ def names(sim: Simulation, outcome: str = "done") -> list[str]:
 # --- the answers ---
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arguments", "keys"),
     [
@@ -188,7 +188,7 @@ async def test_jog_goes_the_way_it_says_and_ends(sim: Simulation) -> None:
 # --- beside a program that runs ---
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("arguments", [["pose"], ["alarms", "--clear"], ["monitor", "--count", "3"], ["suction", "on"]])
 async def test_who_only_looks_disturbs_nobody(sim: Simulation, arguments: list[str]) -> None:
     async with busy(sim):
@@ -225,6 +225,7 @@ async def test_no_arm_is_one_line_and_exit_code_1() -> None:
     assert done.errors.startswith("error: cannot open /dev/nowhere")
 
 
+@pytest.mark.full
 async def test_an_alarm_is_one_line_and_with_json_an_object(sim: Simulation) -> None:
     done = await run("--json", "--url", sim.url, "move", "900", "0", "0")
     assert done.code == 1
@@ -297,6 +298,7 @@ async def test_a_reader_that_leaves_is_no_error(sim: Simulation) -> None:
 # --- programs ---
 
 
+@pytest.mark.full
 async def test_a_program_is_executed_in_order(sim: Simulation, tmp_path: Path) -> None:
     file = tmp_path / "program.txt"
     file.write_text("\ufeff# a comment\n\nmove 200 0 50 mode=movl  # and another\nSuction on\nwait 0.5\nspeed 30 40\n")

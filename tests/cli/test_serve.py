@@ -84,7 +84,7 @@ async def test_json_is_one_object_and_discover_lists_the_arm(sim: Simulation) ->
             assert (arm["url"], arm["info"]["serial_number"]) == (f"zenoh://left?connect={where}", "DTSIM00000000001")
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [

@@ -11,6 +11,7 @@ import scenario_of_stops
 from dobot_async.fleet.magician_planner import MagicianPlanner
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_seed(seed: int) -> None:
     scenario_of_a_cell.run_seed(seed)
@@ -22,13 +23,13 @@ def test_a_seed_of_guarded_arms(seed: int) -> None:
     scenario_of_guards.run_seed(seed)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(3))
 def test_a_seed_of_arms_that_lose_their_places(seed: int) -> None:
     scenario_of_lost_places.run_seed(seed)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(6))
 def test_a_seed_of_a_stop(seed: int) -> None:
     scenario_of_stops.run_seed(seed)

@@ -183,6 +183,7 @@ async def test_a_signal_ends_it_whatever_its_client_does(number: signal.Signals)
         assert errors.decode().strip() == "interrupted; the arm was told to stop"
 
 
+@pytest.mark.full
 async def test_a_cancelled_call_stops_the_arm() -> None:
     async with simulate(listen=TCP, speed=1) as sim, served(sim.url, "--allow-motion") as talk:
         await talk.hello()

@@ -408,6 +408,7 @@ GARBAGE = (
 )
 
 
+@pytest.mark.full
 async def test_nonsense_moves_nothing_and_the_next_command_is_right() -> None:
     async with hall() as broker, ear(broker.port) as heard, simulate("magician", speed=20) as sim:
         async with running(broker.port, sim):

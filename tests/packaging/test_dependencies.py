@@ -115,6 +115,7 @@ def test_an_extra_that_is_missing_is_named(extra: str) -> None:
     assert any(way in source for source in sources for way in ways)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is no D-Bus to simulate")
 def test_a_simulated_ble_module_names_its_extra() -> None:
     program = """

@@ -202,6 +202,7 @@ async def test_a_closed_gripper_takes_nothing() -> None:
     assert [each.kind for each in scene.events] == ["crash"]
 
 
+@pytest.mark.full
 @virtual
 async def test_the_arm_is_where_its_mount_says() -> None:
     """The arm stands turned by 90 degrees, on a rail that goes along x of the scene."""

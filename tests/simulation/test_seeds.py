@@ -57,7 +57,7 @@ def test_seeds_that_once_broke_a_promise(seed: int) -> None:
     run_seed(seed)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
 @pytest.mark.parametrize(("of", "seed"), HARD_CELLS, ids=HARD_CELLS.values())
 def test_cells_that_once_broke_a_promise(of: str, seed: int) -> None:

@@ -373,6 +373,7 @@ async def test_more_udp_clients_than_are_remembered() -> None:
 # Clients that do not read.
 
 
+@pytest.mark.full
 async def test_a_tcp_client_that_does_not_read_waits_with_its_requests() -> None:
     """Its replies would fill the memory; and none of them may be lost."""
     total = 60_000

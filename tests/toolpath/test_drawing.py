@@ -156,6 +156,7 @@ async def test_nothing_is_between_the_points_of_a_stroke() -> None:
         assert set(names[2:]) == {"SetPTPCmd", "SetCPCmd"}
 
 
+@pytest.mark.full
 @virtual
 async def test_the_arm_never_halts_within_a_stroke() -> None:
     path = Toolpath.of([(40 + 40 * math.cos(i / 40), 40 + 40 * math.sin(i / 40)) for i in range(252)])
@@ -262,7 +263,7 @@ async def test_a_progress_that_fails_does_not_stop_the_drawing() -> None:
         assert len(sim.arm.executed) > 10
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("tool", ["pen", "laser"])
 @pytest.mark.parametrize("how", ["stop", "arm.stop", "cancel", "alarm", "timeout"])
 def test_on_every_way_out_the_arm_stands_its_laser_is_off_and_it_goes_on_from_there(tool: Any, how: str) -> None:

@@ -115,6 +115,7 @@ def test_units_of_a_page(width: str, mm: float) -> None:
     assert read_svg(io.StringIO(text)).bounds == pytest.approx((0, 0, mm, mm))
 
 
+@pytest.mark.full
 @settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.complex_numbers(max_magnitude=100), min_size=4, max_size=4), st.floats(0.002, 1))
 def test_curves_are_missed_by_no_more_than_the_tolerance(controls: Sequence[complex], tolerance: float) -> None:
@@ -142,6 +143,7 @@ def by_ezdxf(name: str, scale: float, layers: set[str]) -> list[Line]:
     return found
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("name", "scale", "layers"), [("entities.dxf", 1.0, {"cut", "engrave", "0"}), ("blocks_inch.dxf", 25.4, {"0"})]
 )

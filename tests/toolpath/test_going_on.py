@@ -194,6 +194,7 @@ async def until_it_stands(sim: Simulation) -> None:
         await asyncio.sleep(0.0005)
 
 
+@pytest.mark.full
 @virtual
 async def test_an_index_that_does_not_agree_with_the_place_is_not_believed() -> None:
     path = dashes()

@@ -95,6 +95,7 @@ async def test_a_laser_never_halts_at_all() -> None:
         assert not halts(sim.arm.executed, m.SET_CPLE_CMD)
 
 
+@pytest.mark.full
 @virtual
 async def test_a_path_that_is_too_fine_for_the_line_is_drawn_more_slowly() -> None:
     path = Toolpath.of([(i * 0.05, 0.05 * (i % 2)) for i in range(400)])

@@ -85,7 +85,7 @@ def test_memory_tcp_and_udp_need_none_of_it(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_needs_it_says_so(what: str) -> None:
     call, error, message = REFUSED[what]
