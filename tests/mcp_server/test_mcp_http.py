@@ -72,6 +72,7 @@ async def status(port: int, headers: dict[str, str | None] | None = None, body: 
         return (await head(reader))[0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("mode", ["legacy", "auto"])
 async def test_tools_are_called_by_http(mode: str) -> None:
     async with rig() as r, serve_http(r.server, ("127.0.0.1", 0)) as url, Client(url, mode=mode) as client:
