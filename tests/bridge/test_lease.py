@@ -8,7 +8,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from dobot_async.bridge.desk import Refused
 from virtual import virtual
 
 from dobot_async.arms.mycobot import commands as c
@@ -16,6 +15,7 @@ from dobot_async.arms.mycobot.bridge_adapter import BRIDGED, CobotWatch
 from dobot_async.arms.mycobot.frame import Frame
 from dobot_async.arms.mycobot.models import MODELS
 from dobot_async.bridge.lease import Lease
+from dobot_async.bridge.requests import Refused
 from dobot_async.bridge.standstill import Standstill
 
 MODEL = MODELS["mycobot280"]
