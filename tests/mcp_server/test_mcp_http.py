@@ -223,6 +223,20 @@ async def test_who_does_not_say_what_he_wants_holds_no_place(begun: str, monkeyp
         assert not r.sim.arm.executed
 
 
+async def test_who_opens_very_many_connections_keeps_nobody_out() -> None:
+    async with served() as (r, port), Client(f"http://127.0.0.1:{port}/mcp") as client:
+        silent = [await asyncio.open_connection("127.0.0.1", port) for _ in range(300)]
+        async with asyncio.timeout(IN_TIME):
+            assert await status(port) == 200
+            assert not (await client.call_tool("move", FAR)).is_error
+            with suppress(ConnectionError):
+                assert await silent[0][0].read() == b""
+
+        assert moves(r.sim)
+        for _, writer in silent:
+            writer.transport.abort()
+
+
 async def test_an_answer_has_no_deadline_nor_a_request_that_comes_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(deadline, "WHOLE", 0.5)
     async with served(speed=1.0) as (r, port), Client(f"http://127.0.0.1:{port}/mcp") as client:
