@@ -1,6 +1,7 @@
 # make demo      a pick-and-place cycle on the built-in simulator, over a real pseudo-terminal
 # make panel     a simulated arm in the browser: make panel [ARM_URL=sim:] [OPTIONS="--port 0"]
-# make test      ruff, mypy, pyright and the whole test suite
+# make test      the checkers and the quick suite: everything is tested, on few examples
+# make test-full the checkers and the whole suite, on all examples; with REST=1 only what `make test` has left out
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
 # make docs      the site, in build/site, and what is promised of it; a warning is an error
@@ -10,14 +11,14 @@
 # make sync      writes the blocking classes out of the asynchronous ones again
 # make lerobot   the contract tests of integrations/, with LeRobot but without what only its training needs
 # make soak      random programs on bad lines, in virtual time: make soak [SEEDS=10000] [FIRST=0] [OF=arm|cell|guards|lost|stops]
-# make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test tries
+# make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test-full tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo panel sync lerobot test test-all test-minimum check pytest docs dist sbom format clean fuzz promises soak
+.PHONY: demo panel sync lerobot test test-full test-all test-minimum check pytest docs dist sbom format clean fuzz promises soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
@@ -28,7 +29,18 @@ OPTIONS ?=
 panel: $(VENV)/.panel
 	$(BIN)/python -m dobot_async --url '$(ARM_URL)' panel $(OPTIONS)
 
-test: check pytest
+# Who is ready takes over what others have before them.
+PYTEST := -m pytest -n auto --dist worksteal
+REST ?=
+
+# What the checkers say is kept back until the tests have ended.
+test: $(VENV)/.dev
+	@mkdir -p build
+	@$(MAKE) --no-print-directory check >build/check.txt 2>&1 & checks=$$!; \
+	$(BIN)/python $(PYTEST); tests=$$?; \
+	wait $$checks; checked=$$?; cat build/check.txt; exit $$((tests | checked))
+
+test-full: $(if $(REST),,check) pytest
 
 # --verifytypes looks for libraries with the first python of the PATH, and does not see through an editable install.
 check: $(VENV)/.dev
@@ -59,7 +71,7 @@ test-all:
 
 # What pyproject.toml declares is taken at its lowest, what that needs in turn as pip would.
 test-minimum: .venv-minimum/.dev
-	.venv-minimum/bin/python -m pytest -n auto
+	.venv-minimum/bin/python $(PYTEST) --full
 
 .venv-minimum/.dev: pyproject.toml
 	$(PYTHON) -m venv --clear .venv-minimum
@@ -68,12 +80,12 @@ test-minimum: .venv-minimum/.dev
 	touch $@
 
 pytest: $(VENV)/.dev
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python $(PYTEST) $(if $(REST),--rest,--full)
 
 docs: $(VENV)/.dev
 	rm -rf build/site
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html -d build/doctrees docs build/site
-	DOBOT_SITE=build/site DOBOT_REQUIRE_SITE=1 $(BIN)/python -m pytest -q tests/docs/test_site.py
+	DOBOT_SITE=build/site DOBOT_REQUIRE_SITE=1 $(BIN)/python -m pytest -q --full tests/docs/test_site.py
 
 dist: $(VENV)/.dev
 	rm -rf dist
@@ -98,7 +110,7 @@ LEROBOT := 'lerobot>=0.4.4,<0.5'
 LEROBOT_NEEDS := 'draccus==0.10.0' 'deepdiff>=7.0.1,<9' 'huggingface-hub>=0.34.2,<0.36' 'jsonlines>=4' 'numpy>=2' termcolor tqdm
 
 lerobot: .venv-lerobot/.lerobot
-	DOBOT_REQUIRE_LEROBOT=1 .venv-lerobot/bin/python -m pytest tests/test_integrations.py
+	DOBOT_REQUIRE_LEROBOT=1 .venv-lerobot/bin/python -m pytest --full tests/test_integrations.py
 
 .venv-lerobot/.lerobot: pyproject.toml
 	$(PYTHON) -m venv .venv-lerobot
@@ -109,9 +121,9 @@ lerobot: .venv-lerobot/.lerobot
 ANSWERS ?= 200000
 
 promises: $(VENV)/.dev
-	PROMISES=all $(BIN)/python -m pytest -n auto tests/promises
-	MOMENTS=all $(BIN)/python -m pytest -n auto tests/fleet/test_past_a_stop.py
-	ENGRAVINGS=200 $(BIN)/python -m pytest -n auto tests/toolpath/test_any_moment.py
+	PROMISES=all $(BIN)/python $(PYTEST) --full tests/promises
+	MOMENTS=all $(BIN)/python $(PYTEST) --full tests/fleet/test_past_a_stop.py
+	ENGRAVINGS=200 $(BIN)/python $(PYTEST) --full tests/toolpath/test_any_moment.py
 	$(BIN)/python -W ignore tests/promises/stale.py --answers $(ANSWERS)
 	$(BIN)/python tests/panel/endurance.py --minutes 1
 

@@ -1,6 +1,7 @@
 """What all tests share: time can be virtual, and no test leaves anything behind.
 
-No property test has a deadline: how long an example takes is the machine's affair.
+Which tests run without `--full`, and how many examples a property tries: quick_suite. No property has a deadline, for
+how long an example takes is the machine's affair.
 
 A test marked `virtual_time` runs on a loop whose clock jumps over every wait: an hour passes in no time, and a wait
 that nothing can end fails the test instead of hanging. Such a test does no real I/O.
@@ -16,14 +17,13 @@ from contextlib import suppress
 from pathlib import Path
 
 import async_solipsism
-import hypothesis
 import pytest
+
+pytest_plugins = ["quick_suite"]
 
 DESCRIPTORS = Path("/proc/self/fd")
 ROUNDS = 200
 
-hypothesis.settings.register_profile("dobot_async", deadline=None)
-hypothesis.settings.load_profile("dobot_async")
 OWNED_BY_THE_LOOP = ("asyncio_", "asyncio-waitpid", "AnyIO worker thread")
 
 

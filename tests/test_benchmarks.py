@@ -32,6 +32,7 @@ LINE = 0.0032  # seconds that a CP command and its acknowledgement take at 11520
 POINTS, STEP, SPEED = 600, 0.5, 100.0
 
 
+@pytest.mark.cases(1)
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 @pytest.mark.parametrize("name", sorted(path.stem for path in BENCHMARKS.glob("bench_*.py")))
 def test_runs_and_reports(name: str) -> None:
@@ -54,6 +55,7 @@ def test_all_are_known_to_the_command() -> None:
     assert {f"bench_{name}" for name in NAMES} == {path.stem for path in BENCHMARKS.glob("bench_*.py")}
 
 
+@pytest.mark.full
 def test_what_was_found_is_written_down_quoted_and_drawn(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("Before.\n<!-- figures: lateness -->\nold\n<!-- end of figures -->\nBehind.\n")

@@ -104,6 +104,7 @@ async def test_many_readers_may_share_a_listener() -> None:
     assert await asyncio.gather(*endings) == [[], [], []]
 
 
+@pytest.mark.full
 async def test_a_reader_that_is_gone_costs_nothing() -> None:
     events: Events[int] = Events()
     listener = weakref.ref(aiter(events))

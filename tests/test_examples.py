@@ -243,11 +243,13 @@ def test_each_example_is_checked() -> None:
     assert {path.name for path in EXAMPLES.glob("*.py")} == set(CHECKS)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", CHECKS)
 def test_example(name: str) -> None:
     CHECKS[name](run(name))
 
 
+@pytest.mark.full
 async def test_pick_and_place_sucks_and_lets_go_where_it_should() -> None:
     async with simulate(listen="tcp://127.0.0.1:0", speed=20) as sim:
         await asyncio.to_thread(run, "pick_and_place.py", sim.url)
@@ -262,6 +264,7 @@ async def test_pick_and_place_sucks_and_lets_go_where_it_should() -> None:
     assert places == [(sucks, x, y, 20.0) for y in (-40.0, 0.0, 40.0) for sucks, x in rows]
 
 
+@pytest.mark.full
 async def test_io_and_conveyor_tells_what_the_world_puts_in() -> None:
     async with simulate(listen="tcp://127.0.0.1:0", speed=20) as sim:
         sim.arm.set_input(4, 1)
@@ -275,6 +278,7 @@ async def test_io_and_conveyor_tells_what_the_world_puts_in() -> None:
     assert sum(ways) == 0
 
 
+@pytest.mark.full
 async def test_the_mirror_follows_a_hand_until_ctrl_c() -> None:
     async with (
         simulate(listen="tcp://127.0.0.1:0", speed=20) as leader,
@@ -293,6 +297,7 @@ async def test_the_mirror_follows_a_hand_until_ctrl_c() -> None:
         assert not leader.arm.executed
 
 
+@pytest.mark.full
 async def test_ctrl_c_stops_the_arm() -> None:
     async with simulate(listen="tcp://127.0.0.1:0", speed=10) as sim:
         with start("pick_and_place.py", sim.url) as process:

@@ -62,6 +62,7 @@ def run(where: Path, program: str) -> str:
     return ran.stdout.strip()
 
 
+@pytest.mark.full
 def test_one_line_gives_it_its_public_name_and_its_simulator(tmp_path: Path) -> None:
     said = run(
         tmp_path,
@@ -82,6 +83,7 @@ asyncio.run(main())
     assert said == "90.0 [90.0]"
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -94,6 +96,7 @@ def test_one_line_makes_it_known_to_the_command_line(arguments: list[str], said:
     assert said in run(tmp_path, f"from dobot_async.cli.main import cli; cli({arguments!r})")
 
 
+@pytest.mark.full
 def test_one_line_makes_it_known_to_the_search(tmp_path: Path) -> None:
     said = run(
         tmp_path, "from dobot_async.discovery.families import FAMILIES; print(*[each.name for each in FAMILIES])"
@@ -101,6 +104,7 @@ def test_one_line_makes_it_known_to_the_search(tmp_path: Path) -> None:
     assert said == "magician mycobot ultraarm turntable"
 
 
+@pytest.mark.full
 def test_a_place_whose_part_is_missing_refuses_it_by_name(tmp_path: Path) -> None:
     said = run(
         tmp_path,

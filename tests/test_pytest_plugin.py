@@ -145,30 +145,36 @@ def passed(ran: subprocess.CompletedProcess[str]) -> int:
     return int(found[1])
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("mode", ["auto", "strict"])
 def test_both_modes_of_pytest_asyncio(tmp_path: Path, mode: str) -> None:
     assert passed(run(tmp_path, SUITE, "--asyncio-mode", mode)) == 4
 
 
+@pytest.mark.full
 def test_arms_stand_in_the_scene_of_the_suite(tmp_path: Path) -> None:
     assert passed(run(tmp_path, SCENE_SUITE)) == 6
 
 
+@pytest.mark.full
 def test_all_families_are_served(tmp_path: Path) -> None:
     assert passed(run(tmp_path, FAMILIES_SUITE)) == 4
 
 
+@pytest.mark.full
 def test_auto_mode_needs_no_mark(tmp_path: Path) -> None:
     suite = "async def test_unmarked(simulated_arm):\n    assert simulated_arm.url\n"
     assert passed(run(tmp_path, suite, "--asyncio-mode", "auto", "-p", "no:anyio")) == 1
 
 
+@pytest.mark.full
 def test_the_page_is_a_test_suite(tmp_path: Path) -> None:
     blocks = re.findall(r"^```python\n((?:.*\n)*?)```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
     suite = "\n\n".join(blocks)
     assert passed(run(tmp_path, suite)) == suite.count("async def test_") > 0
 
 
+@pytest.mark.full
 def test_without_pytest_asyncio_the_arms_say_what_is_missing(tmp_path: Path) -> None:
     suite = "def test_other(): pass\n\ndef test_arm(simulated_arm): pass\n"
     hidden = "import sys\nsys.modules['pytest_asyncio'] = None\n"
@@ -179,6 +185,7 @@ def test_without_pytest_asyncio_the_arms_say_what_is_missing(tmp_path: Path) -> 
     assert "pip install pytest-asyncio" in ran.stdout
 
 
+@pytest.mark.full
 def test_a_wrong_mark_is_told(tmp_path: Path) -> None:
     suite = """
 import pytest
@@ -211,6 +218,7 @@ async def test_a_misspelt_setting(simulate_arm):
     assert "simulate_arm takes no spede; it is dobot(listen=" in ran.stdout
 
 
+@pytest.mark.full
 def test_the_seed_is_the_tests_own_and_told_when_it_fails(tmp_path: Path) -> None:
     suite = """
 import pytest
@@ -225,10 +233,12 @@ async def test_arm(faulty_arm, case):
     assert seeds == [str(zlib.crc32(f"test_application.py::test_arm[{case}]".encode())) for case in (1, 2)]
 
 
+@pytest.mark.full
 def test_the_mark_is_listed(tmp_path: Path) -> None:
     assert "@pytest.mark.dobot(listen=..." in run(tmp_path, "", "--markers").stdout
 
 
+@pytest.mark.full
 def test_loading_the_plugin_brings_in_nothing_that_is_not_used_yet(tmp_path: Path) -> None:
     suite = """
 import sys

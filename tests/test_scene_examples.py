@@ -49,6 +49,7 @@ def test_they_are_short(name: str) -> None:
     assert len((EXAMPLES / name).read_text(encoding="utf-8").splitlines()) < SHORT
 
 
+@pytest.mark.full
 async def test_the_sorter_puts_each_piece_into_the_box_of_its_colour() -> None:
     """The belt's top is 60 mm above the table, so that the cup, at arm z 0, touches a piece on it."""
     order = ("blue", "red", "green", "red")
@@ -68,6 +69,7 @@ async def test_the_sorter_puts_each_piece_into_the_box_of_its_colour() -> None:
     assert where == {"blue 0": "blue box", "red 1": "red box", "green 2": "green box", "red 3": "red 1"}
 
 
+@pytest.mark.full
 async def test_the_rail_carries_each_piece_to_its_place() -> None:
     places = [(200, -60), (230, 0), (200, 60)]
     scene = Scene(pieces=[Piece(str(n), (x, y + 100)) for n, (x, y) in enumerate(places)])
@@ -96,6 +98,7 @@ async def test_the_drawing_is_on_the_paper() -> None:
     assert length(triangle) == pytest.approx(40 + 30 + 50, abs=2)
 
 
+@pytest.mark.full
 async def test_what_was_taught_is_played_there_and_back(tmp_path: Path) -> None:
     scene = Scene(pieces=[Piece("red", (250, 0))])
     await run(scene, "teach_and_play.py", str(tmp_path / "taught.json"))
@@ -104,6 +107,7 @@ async def test_what_was_taught_is_played_there_and_back(tmp_path: Path) -> None:
     assert scene.pieces["red"].position == pytest.approx((200, 100, -138), abs=0.1)
 
 
+@pytest.mark.full
 async def test_parts_are_stacked_by_their_colour() -> None:
     colors = ("red", "blue", "red", "green", "red", "blue")
     places = [(x, y) for x in (230, 270) for y in (-20, 0, 20)]

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual, virtual
 
 from dobot_async import (
@@ -190,8 +191,9 @@ async def perform(family: str, plan: Plan, workspace: Workspace | None) -> tuple
     return places, refused
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("family", list(MODES))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(15), deadline=None)
 @given(plan=plans)
 def test_an_arm_never_leaves_its_workspace(family: str, plan: Plan) -> None:
     async def run() -> None:
@@ -201,6 +203,7 @@ def test_an_arm_never_leaves_its_workspace(family: str, plan: Plan) -> None:
     run_virtual(run())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("family", list(MODES))
 @virtual
 async def test_without_a_workspace_the_same_motions_leave_it(family: str) -> None:
@@ -213,6 +216,7 @@ async def test_without_a_workspace_the_same_motions_leave_it(family: str) -> Non
     assert not all(inside(space, place) for place in places)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("family", list(MODES))
 @pytest.mark.parametrize("direction", ["y-", "y+", "j1-"])
 @virtual
@@ -498,3 +502,11 @@ def test_a_straight_way_that_passes_is_inside_everywhere(
         came_in = list(itertools.dropwhile(lambda place: bad(place, 0.05), line))
         assert came_in
         assert not any(bad(place, 0.1) for place in came_in)
+
+
+def test_out_of_a_thin_wall_an_arm_may_go_back_and_not_through() -> None:
+    """Both ends of a way may be less deep than its middle: it is looked at every few millimetres."""
+    wall = Workspace(forbidden=Box((100, 130), (-200, 200), (0, 200)))
+    wall.check_way([(110, 0, 50), (90, 0, 50)])
+    with pytest.raises(OutsideWorkspace, match="through Box"):
+        wall.check_way([(110, 0, 50), (140, 0, 50)])

@@ -15,7 +15,7 @@ from dobot_async.arms.mycobot.models import model_of
 from dobot_async.arms.ultraarm.arm import UltraArm
 from dobot_async.arms.ultraarm.limits import MANUAL_LIMITS
 from dobot_async.cli.drawing_options import Begin
-from dobot_async.cli.failures import StepRefused, WrongFile
+from dobot_async.cli.failures import Interrupted, StepRefused, WrongFile
 from dobot_async.cli.session import CommandSession
 from dobot_async.toolpath import (
     Drawing,
@@ -113,9 +113,16 @@ class Job:
         output, total = self.session.output, len(self.path)
         with output.counting(self.name, total) as count:
             tell = count if output.terminal else None
-            self.session.ask(lambda arm: self._draw(arm, tell))
+            begun: list[Drawing] = []
+            try:
+                self.session.ask(lambda arm: self._draw(arm, tell, begun))
+            except Interrupted as interrupted:
+                if not interrupted.problems and any(each.next_stroke == total for each in begun):
+                    raise Interrupted(interrupted.number, ("all strokes are done",)) from None
 
-    async def _draw(self, arm: Any, count: Callable[[int], None] | None) -> None:
+                raise
+
+    async def _draw(self, arm: Any, count: Callable[[int], None] | None, begun: list[Drawing]) -> None:
         if isinstance(arm, Magician):
             await arm.set_end_effector(self.effector)
 
@@ -126,6 +133,7 @@ class Job:
         report = tick if count else ProgressLines(self.session.output.say)
         try:
             drawing = CommandDrawing(arm, self.path, self.plane, tool=self.tool, progress=report, **self.options)
+            begun.append(drawing)
             await drawing.run(first=self.begin.stroke, point=self.begin.point)
         except ValueError as error:  # the way from where it stands, for all else was looked at before
             raise StepRefused(str(error)) from error

@@ -1,19 +1,27 @@
-"""Requests have to be there in time: who opens a connection and says nothing, or little, holds no place for long.
+"""Connections that bring no request hold no place for long: a few, for a few seconds, as at the ports of a bridge.
 
-connection --> deadline --> head, body --> no deadline any more: the answer takes as long as the arm does
-`-- the next request of the connection: a new deadline
+    connection --> pending --head, body--> request: the answer takes as long as the arm does
+                      `-- too late, too many: cut         `-- the next request of the connection: pending again
+
+Who brings a request without the right token is answered, and its connection closed. So what is not pending is of
+clients that were let in.
 """
 
 from __future__ import annotations
 
 import asyncio
+import math
+from collections import Counter
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from dobot_async.bridge.handshake import PENDING
+
 __all__ = ["PunctualHTTP"]
 
 WHOLE = 20.0  # seconds from the beginning of a connection, or of a later request on it, to the request's last byte
+MOST = 128  # connections with a request
 
 
 class PunctualHTTP(H11Protocol):
@@ -25,6 +33,14 @@ class PunctualHTTP(H11Protocol):
         """Expect the first request."""
         super().connection_made(transport)
         self._expect()
+        here = [each for each in self.connections if isinstance(each, PunctualHTTP) and not each.transport.is_closing()]
+        pending = [each for each in here if each.due < math.inf]
+        if len(here) - len(pending) > MOST:
+            self.transport.abort()
+        elif len(pending) > PENDING:
+            ((most, _),) = Counter(each.address for each in pending).most_common(1)
+            oldest = min((each for each in pending if each.address == most), key=lambda each: each.due)
+            oldest.transport.abort()
 
     def data_received(self, data: bytes) -> None:
         """Take a part of a request."""
@@ -37,6 +53,16 @@ class PunctualHTTP(H11Protocol):
         """Forget it."""
         self._expect_nothing()
         super().connection_lost(exc)
+
+    @property
+    def address(self) -> str:
+        """From where it comes."""
+        return self.client[0] if self.client else "?"
+
+    @property
+    def due(self) -> float:
+        """When its request has to be there, by the loop's clock; infinity if none is expected."""
+        return self._deadline.when() if self._deadline else math.inf
 
     def _expect(self) -> None:
         self._deadline = self._deadline or self.loop.call_later(WHOLE, self.transport.abort)

@@ -36,7 +36,7 @@ __all__ = ["serve_http"]
 logger: logging.Logger = logging.getLogger("dobot_async.mcp")
 PATH = "/mcp"
 LARGEST = 1 << 20  # bytes of a request
-CONNECTIONS, SESSIONS = 64, 16
+BACKLOG, SESSIONS = 64, 16
 IDLE = 600.0  # seconds until a session that asks nothing is forgotten
 TEARDOWN = 1  # seconds for which open connections are waited for at the end
 AHEAD = 4  # messages of a request that are taken before they are wanted
@@ -214,7 +214,6 @@ def config_of(app: ASGIApp, certificate: str | Path | None, key: str | Path | No
         log_config=None,
         access_log=False,
         server_header=False,
-        limit_concurrency=CONNECTIONS,
         timeout_graceful_shutdown=TEARDOWN,
         **tls,
     )
@@ -228,7 +227,7 @@ def listen(host: str, port: int) -> socket.socket:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         keep_alive(listening)  # what is accepted inherits it
         listening.bind((host, port))
-        listening.listen(CONNECTIONS)
+        listening.listen(BACKLOG)
         listening.setblocking(False)
     except OSError as error:
         listening.close()

@@ -20,7 +20,7 @@ from contextlib import suppress
 from typing import Any, SupportsFloat
 
 from dobot_async._core.queue.epoch import Epoch
-from dobot_async._core.util.tasks import cancel_and_join
+from dobot_async._core.util.tasks import cancel_and_join, run_shielded
 from dobot_async.arms.magician.arm import Magician
 from dobot_async.arms.mycobot.arm import MyCobot
 from dobot_async.arms.ultraarm.arm import UltraArm
@@ -193,9 +193,11 @@ class Drawing:
                 self._count(pending)
         except BaseException as error:
             try:
-                await self._end(error, pending)
+                await run_shielded(self._end(error, pending))  # which takes no longer than a way out may
             except asyncio.CancelledError as again:  # of who was cancelled once more meanwhile
-                again.add_note(self._note())
+                for note in getattr(error, "__notes__", ()):
+                    again.add_note(note)
+
                 raise
 
             raise

@@ -15,6 +15,7 @@ from dobot_async.arms.mycobot.bridge_adapter import BRIDGED, CobotWatch
 from dobot_async.arms.mycobot.frame import Frame
 from dobot_async.arms.mycobot.models import MODELS
 from dobot_async.bridge.lease import Lease
+from dobot_async.bridge.requests import Refused
 from dobot_async.bridge.standstill import Standstill
 
 MODEL = MODELS["mycobot280"]
@@ -72,3 +73,28 @@ async def test_an_arm_that_seems_to_stand_for_a_moment_is_stopped_before_the_lea
     assert not line.moving
     assert told == [("lease", True), ("stopped", False), ("released", False), ("lease", False)]
     assert lease.holder is second
+
+
+@virtual
+async def test_who_has_gone_while_it_waited_takes_the_lease_from_nobody() -> None:
+    """Its turn comes when the arm of the one before has been brought to rest, and it may be gone by then."""
+    at_rest = asyncio.Event()
+    cut: list[str] = []
+
+    async def leave(_: object) -> None:
+        await at_rest.wait()
+
+    lease: Lease[Any] = Lease(takeover=True, leave=leave, cut=lambda *_: cut.append("cut"), tell=lambda *_: None)
+    first, second, third = (SimpleNamespace(gone=False, name=name) for name in ("first", "second", "third"))
+    await lease.take(first)
+    first.gone = True
+    tasks = [asyncio.create_task(lease.take(each)) for each in (second, third)]
+    await asyncio.sleep(1)
+    third.gone = True
+    at_rest.set()
+    await tasks[0]
+    with pytest.raises(Refused, match="has gone"):
+        await tasks[1]
+
+    assert lease.holder is second
+    assert not cut

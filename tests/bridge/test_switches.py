@@ -104,6 +104,7 @@ def test_a_laser_is_off_whatever_four_commands_came_behind_a_long_one() -> None:
         assert not bench.active, order
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("busy", [True, False])
 @pytest.mark.parametrize(("thing", "longest"), [("laser", 3), ("stepper", 2), ("jog", 2)])
 def test_nothing_burns_turns_or_moves_when_its_program_is_gone(thing: str, longest: int, busy: bool) -> None:

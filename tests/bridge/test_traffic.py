@@ -96,6 +96,7 @@ def assert_as_good(served: Seen, own: Seen) -> None:
     assert not served.figures.failures["ConnectionLost"]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.usefixtures("virtual_ports")
 @pytest.mark.parametrize("what", ["blip", "loss", "stalled", "silent", "break"])
 def test_a_magician_is_served_as_well_as_by_the_bare_line(what: str) -> None:
@@ -106,6 +107,7 @@ def test_a_magician_is_served_as_well_as_by_the_bare_line(what: str) -> None:
     assert served.done >= 0.8 * own.done > 0
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("virtual_ports")
 @pytest.mark.parametrize(("listen", "programs"), [("ws://127.0.0.1:0", 5), ("tcp://127.0.0.1:0", 15)])
 def test_by_whichever_way_and_however_many_they_are(listen: str, programs: int) -> None:
@@ -113,6 +115,7 @@ def test_by_whichever_way_and_however_many_they_are(listen: str, programs: int) 
     assert_as_good(seen(partial(through_a_bridge, listen=listen), "magician", "loss", programs), own)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.usefixtures("virtual_ports")
 @pytest.mark.parametrize("family", ["mycobot280", "ultraarm"])
 @pytest.mark.parametrize("what", ["blip", "loss", "break"])
@@ -121,6 +124,7 @@ def test_other_arms_are_served_as_well(family: str, what: str) -> None:
     assert_as_good(seen(partial(through_a_bridge, moves=False), family, what), own)
 
 
+@pytest.mark.full
 async def test_ways_that_know_no_virtual_clock_serve_as_well() -> None:
     places = ["pty", "udp://127.0.0.1:0", f"zenoh://left?listen={endpoint()}"]
     async with AsyncExitStack() as stack:

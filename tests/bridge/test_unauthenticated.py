@@ -17,6 +17,7 @@ import pytest
 from bridge_rig import IN_TIME, TCP, ask, bridged, client, far, until
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 
 from dobot_async import Magician
 from dobot_async._core.protocol.transport import MANY
@@ -295,7 +296,7 @@ async def test_who_leaves_before_it_is_let_in_leaves_nothing(reset: bool) -> Non
         assert rig.bridge.clients == 0
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.text())
 def test_any_text_is_made_printable(text: str) -> None:
     shown = printable(text)

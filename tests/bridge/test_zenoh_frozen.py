@@ -116,6 +116,7 @@ async def test_a_program_that_freezes_for_a_moment_loses_nothing(tmp_path: Path)
             assert await line(sleeper) == "0"
 
 
+@pytest.mark.full
 async def test_a_server_that_freezes_is_a_lost_connection_and_holds_up_nothing_but_that() -> None:
     async with (
         bridged(place("right")) as other,
@@ -136,6 +137,7 @@ async def test_a_server_that_freezes_is_a_lost_connection_and_holds_up_nothing_b
         assert isinstance(asked.exception(), Exception)
 
 
+@pytest.mark.full
 async def test_a_frozen_server_is_given_up_in_the_middle_of_what_it_does_not_read(tmp_path: Path) -> None:
     where = endpoint()
     served = written(tmp_path / "server.json5", listen__endpoints=[where], transport__link__tcp=BUFFERS)
@@ -153,6 +155,7 @@ async def test_a_frozen_server_is_given_up_in_the_middle_of_what_it_does_not_rea
         await transport.aclose()
 
 
+@pytest.mark.full
 async def test_a_program_ends_in_time_whose_server_is_frozen_and_reads_nothing(tmp_path: Path) -> None:
     where = endpoint()
     served = written(tmp_path / "server.json5", listen__endpoints=[where], transport__link__tcp=BUFFERS)

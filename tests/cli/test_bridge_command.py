@@ -83,6 +83,7 @@ async def test_it_prints_where_it_is_and_what_happens_and_ends_with_ctrl_c(sim: 
         assert (process.returncode, output, errors) == (130, b"", b"")
 
 
+@pytest.mark.full
 async def test_json_is_one_object_with_a_made_up_token(sim: Simulation) -> None:
     async with started(sim.url, "tcp://0.0.0.0:0", before=("--json",)) as process:
         answer = json.loads(await line(process))
@@ -99,6 +100,7 @@ async def test_json_is_one_object_with_a_made_up_token(sim: Simulation) -> None:
         assert (process.returncode, output, errors) == (143, b"", b"")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("source", ["environment", "file"])
 async def test_a_token_of_ones_own_is_not_printed(sim: Simulation, source: str, tmp_path: Path) -> None:
     file = tmp_path / "token"
@@ -124,6 +126,7 @@ def test_a_file_without_a_token_is_named(text: bytes, tmp_path: Path) -> None:
     assert f"{file} has no token" in done.stderr
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
@@ -142,6 +145,7 @@ async def test_wrong_usage_and_no_arm(arguments: list[str], code: int, told: str
         assert told in errors.decode()
 
 
+@pytest.mark.full
 async def test_an_arm_of_another_family() -> None:
     async with (
         simulate("mycobot280", listen=TCP, speed=50) as sim,
@@ -155,6 +159,7 @@ async def test_an_arm_of_another_family() -> None:
         assert process.returncode == 130
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arm", "more", "told"),
     [("ultraarm", ("udp://127.0.0.1:0",), b"but their order"), ("mycobot", ("--deny", "wifi"), b"deny to be of")],
@@ -173,6 +178,7 @@ async def test_it_writes_no_trace(tmp_path: Path) -> None:
         assert b"no trace" in errors
 
 
+@pytest.mark.full
 async def test_metrics_are_served_beside_it(sim: Simulation) -> None:
     async with started(sim.url, TCP, "--metrics", "127.0.0.1:0") as process:
         await line(process)

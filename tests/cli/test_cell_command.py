@@ -101,6 +101,7 @@ def places(sim: Simulation) -> list[tuple[float, float]]:
     return [(each.value.x, each.value.y) for each in sim.arm.executed if each.command is c.SET_PTP_CMD]
 
 
+@pytest.mark.full
 async def test_status_tells_all_in_the_frame_of_the_cell(file: Path) -> None:
     code, output, errors = await run("--json", "cell", file, "status")
     assert (code, errors) == (0, "")
@@ -110,6 +111,7 @@ async def test_status_tells_all_in_the_frame_of_the_cell(file: Path) -> None:
     assert told["third"]["family"] == "ultraarm"
 
 
+@pytest.mark.full
 async def test_status_and_stop_do_not_need_all(file: Path, arms: dict[str, Simulation]) -> None:
     arms["left"].end()
     code, output, errors = await run("--json", "cell", file, "status")
@@ -121,12 +123,14 @@ async def test_status_and_stop_do_not_need_all(file: Path, arms: dict[str, Simul
     assert json.loads(output)["stopped"] == {"left": False, "right": True, "third": True}
 
 
+@pytest.mark.full
 async def test_home(file: Path, arms: dict[str, Simulation]) -> None:
     code, output, errors = await run("cell", file, "home")
     assert (code, output, errors) == (0, "all arms are home\n", "")
     assert all(sim.arm.executed[-1].command is c.SET_HOME_CMD for sim in arms.values())
 
 
+@pytest.mark.full
 async def test_run(file: Path, arms: dict[str, Simulation], tmp_path: Path) -> None:
     program = tmp_path / "program.txt"
     program.write_text(PROGRAM, encoding="utf-8")
@@ -150,6 +154,7 @@ async def test_run_tells_the_line_of_a_failure_and_stops_all(
     assert [name for name, sim in arms.items() if sim.arm.device.executing] == []
 
 
+@pytest.mark.full
 async def test_what_the_guard_refuses_under_way_is_a_failure_and_not_wrong_usage(
     file: Path, arms: dict[str, Simulation], tmp_path: Path
 ) -> None:
@@ -162,6 +167,7 @@ async def test_what_the_guard_refuses_under_way_is_a_failure_and_not_wrong_usage
     assert errors.startswith("error: left, line 3 (move 200 180 20): ")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("lines", "number"),
     [
@@ -216,6 +222,7 @@ async def test_ctrl_c_stops_all(file: Path, arms: dict[str, Simulation], tmp_pat
     assert all(sim.arm.device.idle for sim in arms.values())
 
 
+@pytest.mark.full
 async def test_watch_shows_all_and_tries_again(file: Path, arms: dict[str, Simulation]) -> None:
     arms["left"].end()
     code, output, _ = await run("--json", "cell", file, "watch", "--count", "2", "--rate", "50")

@@ -114,6 +114,7 @@ def names(sim: Simulation, outcome: str = "done") -> list[str]:
 # --- the answers ---
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arguments", "keys"),
     [
@@ -136,6 +137,7 @@ async def test_an_answer_is_one_json_object(arguments: list[str], keys: list[str
     assert (done.code, done.errors) == (0, "")
 
 
+@pytest.mark.full
 async def test_text_is_plain_in_a_pipe(sim: Simulation) -> None:
     for arguments in (["home"], ["info"], ["monitor", "--count", "2"]):
         done = await run("--url", sim.url, *arguments)
@@ -144,6 +146,7 @@ async def test_text_is_plain_in_a_pipe(sim: Simulation) -> None:
         assert done.errors == ""
 
 
+@pytest.mark.full
 async def test_the_url_may_be_in_the_environment(sim: Simulation) -> None:
     assert (await run("--json", "pose", DOBOT_URL=sim.url)).answer["x"] == pytest.approx(sim.arm.pose.x)
 
@@ -156,6 +159,7 @@ async def test_a_motion_is_done_when_its_command_ends(sim: Simulation) -> None:
     assert sim.arm.executed[-1].value.ptp_mode is c.PTPMode.MOVL_XYZ
 
 
+@pytest.mark.full
 async def test_alarms_are_told_and_cleared(sim: Simulation) -> None:
     sim.arm.device.raise_alarm(0x22)
     done = await run("--json", "--url", sim.url, "alarms")
@@ -166,6 +170,7 @@ async def test_alarms_are_told_and_cleared(sim: Simulation) -> None:
     assert (await run("--url", sim.url, "alarms")).output == "no alarms\n"
 
 
+@pytest.mark.full
 async def test_suction_takes_effect(sim: Simulation) -> None:
     await run("--url", sim.url, "suction", "on")
     assert sim.arm.suction
@@ -183,6 +188,7 @@ async def test_jog_goes_the_way_it_says_and_ends(sim: Simulation) -> None:
 # --- beside a program that runs ---
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("arguments", [["pose"], ["alarms", "--clear"], ["monitor", "--count", "3"], ["suction", "on"]])
 async def test_who_only_looks_disturbs_nobody(sim: Simulation, arguments: list[str]) -> None:
     async with busy(sim):
@@ -219,6 +225,7 @@ async def test_no_arm_is_one_line_and_exit_code_1() -> None:
     assert done.errors.startswith("error: cannot open /dev/nowhere")
 
 
+@pytest.mark.full
 async def test_an_alarm_is_one_line_and_with_json_an_object(sim: Simulation) -> None:
     done = await run("--json", "--url", sim.url, "move", "900", "0", "0")
     assert done.code == 1
@@ -262,6 +269,7 @@ def test_wrong_usage_is_exit_code_2(arguments: list[str]) -> None:
     assert "Error: " in done.stderr
 
 
+@pytest.mark.full
 async def test_without_a_url_the_forms_are_shown() -> None:
     done = await run("pose")
     assert done.code == 2
@@ -290,6 +298,7 @@ async def test_a_reader_that_leaves_is_no_error(sim: Simulation) -> None:
 # --- programs ---
 
 
+@pytest.mark.full
 async def test_a_program_is_executed_in_order(sim: Simulation, tmp_path: Path) -> None:
     file = tmp_path / "program.txt"
     file.write_text("\ufeff# a comment\n\nmove 200 0 50 mode=movl  # and another\nSuction on\nwait 0.5\nspeed 30 40\n")
@@ -336,6 +345,7 @@ def test_each_verb_is_the_command_of_the_queue(line: str, command: Command[Any, 
     assert (step.command, step.value) == (command, value)
 
 
+@pytest.mark.full
 async def test_a_program_longer_than_the_queue_runs_from_standard_input(sim: Simulation) -> None:
     done = await run("--url", sim.url, "run", "-", text="\n".join(LONG_PROGRAM.splitlines()[:80]))
     assert (done.code, done.errors) == (0, "")
@@ -364,6 +374,7 @@ async def test_an_alarm_names_the_line_and_ends_the_program(sim: Simulation) -> 
     assert names(sim) == ["SetWAITCmd"]
 
 
+@pytest.mark.full
 async def test_an_alarm_behind_a_line_of_which_nobody_knows_names_both(sim: Simulation) -> None:
     done = await run("--url", sim.url, "run", "-", text="home\nby 900 0 0\nmove 200 0 50\n")
     assert done.code == 1
@@ -373,6 +384,7 @@ async def test_an_alarm_behind_a_line_of_which_nobody_knows_names_both(sim: Simu
 # --- signals ---
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 async def test_a_signal_stops_the_arm(number: signal.Signals, code: int) -> None:
     async with simulate(listen="tcp://127.0.0.1:0") as sim:
@@ -404,6 +416,7 @@ async def test_ctrl_c_ends_in_time_on_a_dead_line_and_says_what_is_not_known() -
         assert "it is not known whether the arm stands" in done.errors
 
 
+@pytest.mark.full
 async def test_an_impatient_ctrl_c_stops_the_arm_all_the_same() -> None:
     async with simulate(listen="tcp://127.0.0.1:0") as sim:
         process = await start("--url", sim.url, "move", "200", "60", "50")
@@ -421,6 +434,7 @@ async def test_an_impatient_ctrl_c_stops_the_arm_all_the_same() -> None:
         assert "aborted" in [each.outcome for each in sim.arm.executed]
 
 
+@pytest.mark.full
 async def test_ctrl_c_ends_a_monitor_and_leaves_the_arm_alone(sim: Simulation) -> None:
     async with busy(sim):
         process = await start("--json", "--url", sim.url, "monitor", "--rate", "100")
@@ -435,6 +449,7 @@ async def test_ctrl_c_ends_a_monitor_and_leaves_the_arm_alone(sim: Simulation) -
 # --- the simulator as a process ---
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("listen", "scheme"), [("pty", "serial:///dev/"), ("tcp://127.0.0.1:0", "tcp://"), ("udp://127.0.0.1:0", "udp://")]
 )
@@ -451,6 +466,7 @@ async def test_simulate_prints_its_url_first(listen: str, scheme: str) -> None:
     assert await finish(process) == (143, "", "")
 
 
+@pytest.mark.full
 async def test_simulate_passes_the_faults_on() -> None:
     process = await start("--json", "simulate", "--listen", "tcp://127.0.0.1:0", "--noise", "1", "--seed", "1")
     assert process.stdout
@@ -462,6 +478,7 @@ async def test_simulate_passes_the_faults_on() -> None:
     assert (await finish(process)).code == 130
 
 
+@pytest.mark.full
 async def test_a_port_that_is_taken_is_exit_code_1(sim: Simulation) -> None:
     done = await run("simulate", "--listen", sim.url)
     assert (done.code, done.output) == (1, "")
@@ -498,6 +515,7 @@ VECTORS = [
 ]
 
 
+@pytest.mark.full
 async def test_decode_knows_the_frames_of_real_arms() -> None:
     done = await run("--json", "decode", *(raw for raw, _, _ in VECTORS))
     pieces = done.answer["pieces"]
@@ -507,6 +525,7 @@ async def test_decode_knows_the_frames_of_real_arms() -> None:
         assert {role: piece[role] for role in ("request", "reply") if role in piece} == values
 
 
+@pytest.mark.full
 async def test_decode_shows_junk_with_its_reason() -> None:
     good, wrong, cut = "AA AA 02 0A 00 F6", "AAAA13540301 00007A43 000000000000000000000000 EA", "aa:aa:13:54"
     pieces = (await run("--json", "decode", "0x01,0x02", good, wrong, good, cut)).answer["pieces"]
@@ -520,6 +539,7 @@ async def test_decode_shows_junk_with_its_reason() -> None:
     assert [piece["offset"] for piece in pieces] == [0, 2, 8, 31, 37]
 
 
+@pytest.mark.full
 async def test_decode_knows_the_frames_of_a_mycobot() -> None:
     good = "FE FE 03 12 01 FA"
     done = await run("--json", "--arm", "mycobot", "decode", "07", good, "FE FE 02 29 FA", "FE FE 02 29 FB")
@@ -530,6 +550,7 @@ async def test_decode_knows_the_frames_of_a_mycobot() -> None:
     assert "footer" in wrong["junk"]
 
 
+@pytest.mark.full
 async def test_decode_knows_the_lines_of_an_ultraarm() -> None:
     text = b"G0 X200 Y0.5 F100\rM120\r ANGLES[1.00 ,2.00 ,3.00 ,0.00]\r\nERROR: TOO FAR\r\nhello\r\nQUEUE SIZE[3]\r\n"
     done = await run("--json", "--arm", "ultraarm", "decode", text.hex())
@@ -571,6 +592,7 @@ async def test_a_trace_has_every_frame(sim: Simulation, tmp_path: Path) -> None:
         assert c.BY_KEY[frame.id, frame.write].name == line["command"]
 
 
+@pytest.mark.full
 async def test_a_trace_that_cannot_be_written_does_not_keep_the_arm_from_moving(sim: Simulation) -> None:
     done = await run("--json", "--url", sim.url, "--trace", "/dev/full", "move", "220", "0", "40")
     assert done.answer["x"] == pytest.approx(220, abs=0.01)
@@ -593,6 +615,7 @@ async def test_the_demo_tells_plain_lines_and_a_summary() -> None:
     assert re.match(r"junk bytes +0, 0 bad frames$", junk)
 
 
+@pytest.mark.full
 async def test_the_demo_counts_what_the_arm_did(sim: Simulation) -> None:
     answer = (await run("--json", "--url", sim.url, "demo", "--cycles", "1", "--yes")).answer
     assert answer["commands"] == len(names(sim)) == 1 + 3 * 10
@@ -601,6 +624,7 @@ async def test_the_demo_counts_what_the_arm_did(sim: Simulation) -> None:
     assert not sim.arm.suction
 
 
+@pytest.mark.full
 async def test_the_demo_leaves_the_arm_in_the_environment_alone(sim: Simulation) -> None:
     answer = (await run("--json", "demo", "--cycles", "1", "--speed", "50", DOBOT_URL=sim.url)).answer
     assert answer["url"].startswith("serial:///dev/")
@@ -615,6 +639,7 @@ def terminal() -> Iterator[tuple[int, int]]:
     os.close(slave)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("command", ["home", "run", "demo", "monitor"])
 async def test_a_terminal_shows_progress(sim: Simulation, terminal: tuple[int, int], command: str) -> None:
     master, slave = terminal
@@ -639,6 +664,7 @@ async def test_a_terminal_shows_progress(sim: Simulation, terminal: tuple[int, i
     assert b"\x1b[" in shown
 
 
+@pytest.mark.full
 async def test_no_progress_and_no_colour_with_json_on_a_terminal(sim: Simulation, terminal: tuple[int, int]) -> None:
     master, slave = terminal
     process = await start("--json", "--url", sim.url, "home", stdout=slave, environment={"TERM": "xterm"})

@@ -94,6 +94,7 @@ async def on_usb() -> AsyncIterator[Simulation]:
 # --- discover ---
 
 
+@pytest.mark.full
 async def test_a_search_with_probe_tells_who_is_there() -> None:
     async with in_wifi(1, 2) as (_, options):
         arguments = ("discover", "--source", "wifi", "--timeout", "2", "--probe", *options)
@@ -170,6 +171,7 @@ async def test_an_arm_is_brought_into_a_network_and_found_there(on_usb: Simulati
     assert not on_usb.arm.executed
 
 
+@pytest.mark.full
 async def test_an_address_of_its_own_is_enough_to_know_it(on_usb: Simulation) -> None:
     async with in_wifi(3) as (_, options):
         address = ["--address", f"{OWN}.3", "--gateway", f"{OWN}.1"]
@@ -179,6 +181,7 @@ async def test_an_address_of_its_own_is_enough_to_know_it(on_usb: Simulation) ->
     assert on_usb.arm.state.get(c.SET_WIFI_GATEWAY).addr == tuple(map(int, f"{OWN}.1".split(".")))
 
 
+@pytest.mark.full
 async def test_the_password_is_in_no_trace(on_usb: Simulation, tmp_path: Path) -> None:
     trace = tmp_path / "trace"
     async with in_wifi(2) as (_, options):
@@ -208,6 +211,7 @@ def test_nor_is_it_when_it_is_read_or_does_not_fit() -> None:
     assert b"hunter2".hex(" ") not in text
 
 
+@pytest.mark.full
 async def test_a_network_that_it_cannot_join(on_usb: Simulation) -> None:
     on_usb.arm.state.networks = {"cell": PASSWORD}
     done = await run("--url", on_usb.url, "wifi", "cell", "--timeout", "0.5", text="wrong\n")
@@ -215,6 +219,7 @@ async def test_a_network_that_it_cannot_join(on_usb: Simulation) -> None:
     assert done.errors.startswith("error: the arm did not join its Wi-Fi within 0.5 s")
 
 
+@pytest.mark.full
 async def test_an_arm_that_is_not_found_is_not_made_up(on_usb: Simulation) -> None:
     async with in_wifi(1) as (_, options):
         done = await run("--url", on_usb.url, "wifi", "cell", "--search", "1.5", *options, text="pass\n")
@@ -242,6 +247,7 @@ def test_wrong_usage_sets_nothing_up(arguments: list[str], text: str | bytes, me
     assert message in done.stderr
 
 
+@pytest.mark.full
 async def test_a_terminal_is_asked_and_does_not_show_the_password(on_usb: Simulation) -> None:
     master, slave = os.openpty()
     program = "import os, sys; os.login_tty(0); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"

@@ -108,6 +108,7 @@ async def test_a_file_is_drawn_where_and_as_large_as_it_is_said(sim: Simulation,
     assert sim.arm.pose.z == pytest.approx(-35, abs=0.01)
 
 
+@pytest.mark.full
 async def test_a_text_is_written_turned_and_fast(sim: Simulation) -> None:
     arguments = ["write", "Ab", *AT, "--height", "20", "--rotate", "-90", "--speed", "120", "--tool", "80", "0", "-5"]
     code, output, errors = await run("--url", sim.url, *arguments)
@@ -128,6 +129,7 @@ async def test_a_text_is_written_turned_and_fast(sim: Simulation) -> None:
     assert sim.arm.state.get(m.SET_END_EFFECTOR_PARAMS) == m.EndEffectorParams(80, 0, -5)
 
 
+@pytest.mark.full
 async def test_a_picture_is_engraved_with_a_share_of_the_power(sim: Simulation) -> None:
     picture = str(FILES / "shapes.png")
     options = ["--size", "30", "30", "--line", "2", "--mode", "grey", "--power", "40"]
@@ -139,11 +141,13 @@ async def test_a_picture_is_engraved_with_a_share_of_the_power(sim: Simulation) 
     assert sim.arm.laser == 0
 
 
+@pytest.mark.full
 async def test_pressure_is_a_depth(sim: Simulation, cross: str) -> None:
     assert (await run("--url", sim.url, "draw", cross, *AT, "--press", "2", "--power", "50"))[0] == 0
     assert {each.value.z for each in sim.arm.executed if each.command is m.SET_CP_CMD} == {-41}
 
 
+@pytest.mark.full
 async def test_an_ultraarm_draws_and_engraves(cross: str) -> None:
     async with simulate("ultraarm", listen="tcp://127.0.0.1:0", speed=50) as sim:
         async with UltraArm.connect(sim.url) as arm:
@@ -161,6 +165,7 @@ async def test_an_ultraarm_draws_and_engraves(cross: str) -> None:
         assert not sim.arm.registers.laser
 
 
+@pytest.mark.full
 async def test_a_mycobot_draws(cross: str) -> None:
     async with simulate("mycobot280", listen="tcp://127.0.0.1:0", speed=50) as sim:
         async with MyCobot.connect(sim.url) as arm:
@@ -175,6 +180,7 @@ async def test_a_mycobot_draws(cross: str) -> None:
         assert (170, -60, 90) in [each.value.coords[:3] for each in sim.arm.executed if hasattr(each.value, "coords")]
 
 
+@pytest.mark.full
 async def test_a_terminal_shows_a_bar(sim: Simulation, cross: str) -> None:
     master, slave = os.openpty()
     os.set_blocking(master, False)
@@ -262,6 +268,7 @@ def test_out_of_reach_names_stroke_point_place_and_reason_in_one_line(cross: str
     )
 
 
+@pytest.mark.full
 async def test_the_way_from_where_the_arm_stands_names_the_stroke_and_nothing_moves(sim: Simulation) -> None:
     sim.arm.guide_to(0, 210, 0)
     code, output, errors = await run("--url", sim.url, "write", "-", "--at", "0", "-215", "0")
@@ -270,6 +277,7 @@ async def test_the_way_from_where_the_arm_stands_names_the_stroke_and_nothing_mo
     assert not [each for each in sim.arm.executed if each.command in {m.SET_PTP_CMD, m.SET_CP_CMD}]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("library", "arguments"),
     [
@@ -305,6 +313,7 @@ def test_a_dry_run_needs_no_arm_and_estimates(cross: str, arm: str) -> None:
     )
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_a_preview_is_saved_even_of_what_is_out_of_reach(cross: str, tmp_path: Path, kind: str) -> None:
     for at, code in ((AT, 0), (["--at", "300", "0", "-40"], 2)):
@@ -338,6 +347,7 @@ async def until_it_burns(sim: Simulation, seconds: float, process: Process) -> N
     await asyncio.sleep(seconds)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(3))
 async def test_ctrl_c_switches_the_laser_off_and_the_rest_is_burnt_once(seed: int) -> None:
     chance, picture, options = random.Random(seed), FILES / "shapes.png", ["--size", "24", "24", "--line", "2"]
@@ -384,6 +394,7 @@ async def test_ctrl_c_switches_the_laser_off_and_the_rest_is_burnt_once(seed: in
         assert burner.length == pytest.approx(path.length, abs=0.02 * times)
 
 
+@pytest.mark.full
 async def test_ctrl_c_of_a_pen_draws_the_stroke_again_from_its_start(cross: str) -> None:
     async with simulate(listen="tcp://127.0.0.1:0", speed=2) as sim:
         process = await start("--url", sim.url, "draw", cross, *AT, "--speed", "20")
@@ -402,6 +413,7 @@ async def test_ctrl_c_of_a_pen_draws_the_stroke_again_from_its_start(cross: str)
         assert len(lines_drawn(sim)) - before in {3, 4}
 
 
+@pytest.mark.full
 async def test_an_alarm_is_exit_code_1_and_tells_the_rest(cross: str) -> None:
     async with simulate(listen="tcp://127.0.0.1:0", speed=2) as sim:
         process = await start("--json", "--url", sim.url, "engrave", cross, *AT)
@@ -417,6 +429,7 @@ async def test_an_alarm_is_exit_code_1_and_tells_the_rest(cross: str) -> None:
         assert sim.arm.laser == 0
 
 
+@pytest.mark.full
 async def test_a_dead_line_is_told_in_time_with_the_rest(cross: str) -> None:
     async with simulate(listen="tcp://127.0.0.1:0", speed=2) as sim:
         process = await start("--url", sim.url, "engrave", cross, *AT)

@@ -203,6 +203,7 @@ def run(command: str, **options: Any) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run(["bash", "-c", words], capture_output=True, timeout=60, check=False, **options)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("command", ["pose", "--json pose"])
 def test_an_output_that_is_full_is_a_failure_without_a_traceback(command: str) -> None:
     done = run(f"--url {SIM} {command} > /dev/full")
@@ -221,6 +222,7 @@ def test_a_trace_into_a_pipe_that_nobody_reads_is_wrong_usage(tmp_path: Path) ->
     assert "nobody reads from this pipe" in errors("--url", SIM, "--trace", str(pipe), "pose")
 
 
+@pytest.mark.full
 def test_a_trace_into_a_pipe_whose_reader_stalls_does_not_hold_up_the_arm(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -234,6 +236,7 @@ def test_a_trace_into_a_pipe_whose_reader_stalls_does_not_hold_up_the_arm(tmp_pa
     assert b"warning: the trace ended early" in done.stderr
 
 
+@pytest.mark.full
 def test_a_quit_from_the_terminal_stops_the_arm_as_well() -> None:
     command = (sys.executable, "-W", "error", "-m", "dobot_async", "--url", "sim:", "run", "-")
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:

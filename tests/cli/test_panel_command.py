@@ -95,6 +95,7 @@ async def test_a_simulated_arm_with_its_scene_and_a_code_for_a_phone() -> None:
         assert not err
 
 
+@pytest.mark.full
 async def test_tokens_that_were_given_are_not_shown(tmp_path: Path) -> None:
     file = tmp_path / "token"
     file.write_text(f"{OPERATOR}\n")
@@ -125,6 +126,7 @@ async def test_tokens_that_were_given_are_not_shown(tmp_path: Path) -> None:
         assert VIEWER.encode() not in out + err
 
 
+@pytest.mark.full
 async def test_several_arms_and_a_cell_file(tmp_path: Path) -> None:
     async with started("--json", "panel", "--port", "0", "left=sim:", "right=sim:?speed=2") as process:
         first = json.loads(await line(process))
@@ -143,6 +145,7 @@ async def test_several_arms_and_a_cell_file(tmp_path: Path) -> None:
         assert found["zones"][0]["name"] == "bin"
 
 
+@pytest.mark.full
 async def test_an_arm_of_another_family_by_its_model() -> None:
     async with started("--url", "sim:", "--arm", "mecharm270", "--json", "panel", "--port", "0") as process:
         first = json.loads(await line(process))
@@ -179,6 +182,7 @@ def test_wrong_usage_is_told(arguments: list[str], said: str, tmp_path: Path, mo
     assert said in done.output
 
 
+@pytest.mark.full
 async def test_a_taken_port_is_a_failure_in_one_line() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         async with started("--url", "sim:", "panel", "--port", str(taken.getsockname()[1])) as process:
@@ -189,6 +193,7 @@ async def test_a_taken_port_is_a_failure_in_one_line() -> None:
     assert err.count(b"\n") == 1
 
 
+@pytest.mark.full
 async def test_without_aiohttp_it_says_what_to_install() -> None:
     program = (
         "import sys; sys.modules['aiohttp'] = None\n"

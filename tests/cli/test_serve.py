@@ -71,6 +71,7 @@ async def test_it_prints_where_it_is_and_what_happens_and_ends_with_ctrl_c(sim: 
         assert (server.returncode, output, errors) == (130, b"", b"")
 
 
+@pytest.mark.full
 async def test_json_is_one_object_and_discover_lists_the_arm(sim: Simulation) -> None:
     where = endpoint()
     async with program(*served(sim.url, "--listen", where, json_answer=True)) as server:
@@ -83,6 +84,7 @@ async def test_json_is_one_object_and_discover_lists_the_arm(sim: Simulation) ->
             assert (arm["url"], arm["info"]["serial_number"]) == (f"zenoh://left?connect={where}", "DTSIM00000000001")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
@@ -131,6 +133,7 @@ async def test_a_server_that_is_killed_is_a_lost_connection() -> None:
             await arm.get_pose()
 
 
+@pytest.mark.full
 async def test_a_program_goes_on_when_a_killed_server_is_started_again(sim: Simulation) -> None:
     where = endpoint()
     async with (
@@ -207,6 +210,7 @@ class Cable:
 LOSING = MOVER.replace("await asyncio.sleep(3600)", "await arm.queue.join()")
 
 
+@pytest.mark.full
 async def test_a_cable_that_is_pulled_out_stops_the_arm_and_tells_the_mover(cable: Cable) -> None:
     where = f"tcp/{cable.address}:7447"
     async with (
@@ -241,6 +245,7 @@ async def reads(url: str, cable: Cable) -> tuple[int | None, str]:
         return reader.returncode, output.decode()
 
 
+@pytest.mark.full
 async def test_an_arm_is_for_its_own_computer_unless_it_is_given_to_everybody(cable: Cable) -> None:
     for options, found in (((), False), (("--lan",), True)):
         async with program(*served("sim:", *options), before=cable.inside(cable.left)) as server:
@@ -250,6 +255,7 @@ async def test_an_arm_is_for_its_own_computer_unless_it_is_given_to_everybody(ca
             assert ("no arm called left is on Zenoh" in told) != found
 
 
+@pytest.mark.full
 async def test_an_arm_that_is_given_to_everybody_is_discovered(cable: Cable) -> None:
     async with program(*served("sim:", "--lan"), before=cable.inside(cable.left)) as server:
         await line(server)

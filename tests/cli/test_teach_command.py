@@ -177,6 +177,7 @@ async def test_the_arm_moves_while_a_key_is_held_and_no_longer(sim: Simulation, 
     assert {each.cmd for each in jogs} <= {c.JOGKey.CP_DOWN, c.JOGKey.BP_DOWN, c.JOGKey.IDLE}
 
 
+@pytest.mark.full
 async def test_a_tap_moves_it_a_little_and_another_key_ends_a_jog(sim: Simulation, tmp_path: Path) -> None:
     async with taught(sim, tmp_path / "part.json") as at:
         start = sim.arm.pose
@@ -198,6 +199,7 @@ async def test_a_tap_moves_it_a_little_and_another_key_ends_a_jog(sim: Simulatio
     assert not (tmp_path / "part.json").exists()
 
 
+@pytest.mark.full
 async def test_what_was_typed_ahead_moves_nothing(sim: Simulation, tmp_path: Path) -> None:
     """While the line stands still keys come in; when it goes on they are old."""
     async with taught(sim, tmp_path / "part.json") as at:
@@ -218,6 +220,7 @@ async def test_what_was_typed_ahead_moves_nothing(sim: Simulation, tmp_path: Pat
         assert await at.end() == 0
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGHUP, 129), (signal.SIGTERM, 143)])
 async def test_a_signal_stops_the_arm_and_keeps_what_was_taken(
     sim: Simulation, tmp_path: Path, number: int, code: int
@@ -234,6 +237,7 @@ async def test_a_signal_stops_the_arm_and_keeps_what_was_taken(
     assert len(load_recording(tmp_path / "part.json").steps) == 1
 
 
+@pytest.mark.full
 async def test_it_cannot_be_suspended_by_a_key_while_the_arm_moves(sim: Simulation, tmp_path: Path) -> None:
     """Ctrl-Z and Ctrl-S, which would leave nobody to stop the arm, are keys as any other; Ctrl-C is what it is."""
     async with taught(sim, tmp_path / "part.json", shell=True) as at:
@@ -251,6 +255,7 @@ async def test_it_cannot_be_suspended_by_a_key_while_the_arm_moves(sim: Simulati
         await stands(sim)
 
 
+@pytest.mark.full
 async def test_a_terminal_that_is_closed_ends_it(sim: Simulation, tmp_path: Path) -> None:
     master, slave = os.openpty()
     command = [*MODULE, "--url", sim.url, "teach", str(tmp_path / "part.json")]
@@ -327,6 +332,7 @@ async def test_any_key_stops_what_is_played(sim: Simulation, tmp_path: Path) -> 
         assert await at.end() == 0
 
 
+@pytest.mark.full
 async def test_what_a_playback_file_cannot_hold_is_kept_as_json(tmp_path: Path) -> None:
     file = tmp_path / "part.playback"
     (tmp_path / "part.json").write_text("something else")
@@ -347,6 +353,7 @@ async def test_what_a_playback_file_cannot_hold_is_kept_as_json(tmp_path: Path) 
     assert (step.suction, step.gripper) == (True, 0)
 
 
+@pytest.mark.full
 async def test_an_end_of_the_way_is_told_and_can_be_left(tmp_path: Path) -> None:
     async with (
         simulate("mycobot280", listen="tcp://127.0.0.1:0", speed=FAST) as sim,
@@ -374,6 +381,7 @@ async def test_an_end_of_the_way_is_told_and_can_be_left(tmp_path: Path) -> None
 # Leading
 
 
+@pytest.mark.full
 async def test_the_key_on_the_forearm(sim: Simulation, tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     command = [*MODULE, "--url", sim.url, "teach", str(file), "--hand", "--count", "2"]
@@ -393,6 +401,7 @@ async def test_the_key_on_the_forearm(sim: Simulation, tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.full
 async def test_a_released_cobot_is_led_until_a_key_is_pressed(tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     async with (
@@ -417,6 +426,7 @@ async def test_a_released_cobot_is_led_until_a_key_is_pressed(tmp_path: Path) ->
     assert path[-1].joints[0] == pytest.approx(20, abs=0.1)
 
 
+@pytest.mark.full
 async def test_the_answer_in_json(tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     async with simulate("mycobot280", listen="tcp://127.0.0.1:0") as sim:
@@ -440,6 +450,7 @@ async def test_the_answer_in_json(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.full
 async def test_an_ultraarm_that_notices_nothing_leaves_no_file(tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     async with simulate("ultraarm", listen="tcp://127.0.0.1:0", homed=True) as sim:
@@ -456,6 +467,7 @@ async def test_an_ultraarm_that_notices_nothing_leaves_no_file(tmp_path: Path) -
 TWO = (TaughtStep((220, 0, 40, 0)), TaughtStep((220, 60, 40, 0)))
 
 
+@pytest.mark.full
 async def test_a_file_is_played(tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     save_recording(Recording("magician", steps=TWO), file)
@@ -466,6 +478,7 @@ async def test_a_file_is_played(tmp_path: Path) -> None:
         assert places == [60, 0, 60, 0]
 
 
+@pytest.mark.full
 async def test_the_arm_of_a_file_is_taken(tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     save_recording(Recording("mycobot", "myarm300", path=(PathSample(0, (0,) * 7), PathSample(1, (5,) * 7))), file)
@@ -480,6 +493,7 @@ async def test_the_arm_of_a_file_is_taken(tmp_path: Path) -> None:
         assert "recorded from a myarm300, and --arm is ultraarm; nothing was sent" in errors
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("recording", "words"),
     [
@@ -500,6 +514,7 @@ async def test_what_is_wrong_in_a_file_is_usage_and_nothing_is_sent(
     assert sim.arm.counters.requests == 0
 
 
+@pytest.mark.full
 async def test_another_tool_on_the_arm_is_found_when_it_is_connected(sim: Simulation, tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     save_recording(Recording("magician", tool="pen", tool_offset=(61, 0, 0), steps=TWO), file)
@@ -509,6 +524,7 @@ async def test_another_tool_on_the_arm_is_found_when_it_is_connected(sim: Simula
     assert not [each for each in sim.arm.executed if each.command.moves]
 
 
+@pytest.mark.full
 async def test_a_playback_file_is_played_and_what_is_not_known_in_it_is_told(sim: Simulation, tmp_path: Path) -> None:
     file = tmp_path / "part.playback"
     save_recording(Recording("magician", steps=TWO), file)
@@ -519,6 +535,7 @@ async def test_a_playback_file_is_played_and_what_is_not_known_in_it_is_told(sim
     assert "item_13" in errors
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "arguments",
     [

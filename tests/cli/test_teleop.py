@@ -58,6 +58,7 @@ async def test_the_newest_line_is_the_target() -> None:
         assert sim.arm.pose.y > 9
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("line", "words"), [(b"1 2 three\n", "line 2: could not"), (b"900 0 0\n", "line 2: (900")])
 async def test_a_wrong_line_is_named_and_the_arm_stops(line: bytes, words: str) -> None:
     async with arm() as sim:
@@ -69,6 +70,7 @@ async def test_a_wrong_line_is_named_and_the_arm_stops(line: bytes, words: str) 
         assert not sim.arm.device.moving
 
 
+@pytest.mark.full
 async def test_a_trajectory_is_played_and_a_wrong_file_is_told_before(tmp_path: Path) -> None:
     async with arm() as sim:
         sim.arm.device.place(JOINTS)

@@ -31,6 +31,7 @@ def file(tmp_path: Path) -> Path:
     return found
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("listen", ["tcp://127.0.0.1:0", "ws://127.0.0.1:0"])
 @pytest.mark.parametrize("way", ["file", "environment"])
 async def test_a_client_gets_in_with_it(listen: str, way: str, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

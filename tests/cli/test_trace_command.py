@@ -102,6 +102,7 @@ def test_show_has_a_line_for_each(trace: Path) -> None:
     assert [each["kind"] for each in told] == [line.kind for line in read_trace(trace).lines]
 
 
+@pytest.mark.full
 def test_plot_draws_in_the_terminal_and_into_a_picture(trace: Path, tmp_path: Path) -> None:
     text = call("trace", "plot", str(trace)).stdout
     assert text == in_terminal(read_trace(trace).of(None), 80) + "\n"

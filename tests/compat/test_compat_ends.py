@@ -190,6 +190,7 @@ async def test_a_queue_that_was_halted_runs_when_it_is_told_to() -> None:
     assert outcomes(sim)[:2] == ["done", "done"]
 
 
+@pytest.mark.full
 async def test_a_full_queue_that_does_not_run_is_an_error_and_no_hang() -> None:
     def program(url: str) -> None:
         api = connected(url)
@@ -376,6 +377,7 @@ ENDS: dict[str, tuple[str, Callable[[list[str]], bool]]] = {
 }
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ENDS)
 async def test_a_program_that_does_not_close_ends_as_it_should(name: str) -> None:
     """What was queued is done after a normal end; after an error the arm stops, whatever other threads still do."""

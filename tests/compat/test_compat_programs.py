@@ -26,6 +26,7 @@ def test_one_import_is_changed(program: str) -> None:
     assert text.count("dobot_async") == 1
 
 
+@pytest.mark.cases(1)
 @programs
 async def test_every_part_is_where_it_belongs(program: str) -> None:
     job = JOBS[program]
@@ -34,6 +35,7 @@ async def test_every_part_is_where_it_belongs(program: str) -> None:
     job.check(ended.scene)
 
 
+@pytest.mark.cases(1)
 @programs
 async def test_a_lost_reply_changes_nothing(program: str) -> None:
     """The arm has taken the motions whose replies were lost: none is made twice, and none is left out."""
@@ -44,6 +46,7 @@ async def test_a_lost_reply_changes_nothing(program: str) -> None:
     job.check(ended.scene)
 
 
+@pytest.mark.full
 @programs
 async def test_an_alarm_is_raised(program: str) -> None:
     """The program ends with what the alarm is, and the arm makes no motion after it."""
@@ -63,6 +66,7 @@ async def test_an_alarm_is_raised(program: str) -> None:
     assert "done" not in {each.outcome for each in done}
 
 
+@pytest.mark.cases(1)
 @programs
 async def test_ctrl_c_stops_the_arms(program: str) -> None:
     """Ctrl-C comes out as KeyboardInterrupt, wherever the program is, and nothing moves after it."""
@@ -80,6 +84,7 @@ async def test_ctrl_c_stops_the_arms(program: str) -> None:
         assert set(motions) <= {"done", "aborted"}
 
 
+@pytest.mark.full
 async def test_the_drawing_is_on_the_paper() -> None:
     """pydobot cannot say that there is a pen, which is 1.3 mm longer than a cup."""
     ended = await run(JOBS["pydobot_drawing.py"])

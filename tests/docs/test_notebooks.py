@@ -34,10 +34,12 @@ def no_window(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     plt.close("all")
 
 
+@pytest.mark.full
 def test_each_notebook_is_known() -> None:
     assert {path.stem for path in NOTEBOOKS.glob("*.ipynb")} == set(WORDS)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", WORDS)
 def test_notebook(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {"__name__": "__main__"}

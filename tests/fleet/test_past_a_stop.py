@@ -189,6 +189,7 @@ async def jogs_of_families(fleet: Fleet[Any]) -> None:
     await fleet.run({name: jog(name, directions) for name, directions in DIRECTIONS.items()})
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("scenario", [of_families, jogs_of_families], ids=lambda scenario: scenario.__name__)
 def test_families_at_each_step(scenario: Scenario) -> None:
     @virtual
@@ -239,6 +240,7 @@ async def stopped_at(step: int, scenario: Scenario, fleet: Fleet[Any], sims: Map
     return True
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("latency", [0.002, *([0.0, 0.03] if ALL else [])])
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.__name__)
 def test_at_each_step(scenario: Scenario, latency: float) -> None:

@@ -19,6 +19,7 @@ import pytest
 from hypothesis import Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from quick_suite import examples
 from waits import Scene, Wait, named
 
 from dobot_async import DobotError, MotionStopped
@@ -476,7 +477,7 @@ ACTIONS: dict[Callable[[Cell, Any], None], tuple[int, Callable[[Cell], Sequence[
 """How often something is done, and by whom."""
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink)
-Cell.TestCase.settings = settings(max_examples=40, stateful_step_count=50, deadline=None, phases=PHASES)
+Cell.TestCase.settings = settings(max_examples=examples(40), stateful_step_count=50, deadline=None, phases=PHASES)
 test_any_cell = Cell.TestCase
 
 

@@ -63,6 +63,7 @@ async def test_the_arm_follows_and_the_newest_target_wins(family: Family) -> Non
         assert follow.target.numbers[:3] == pytest.approx(r.beside(y=-10))
 
 
+@pytest.mark.cases(1)
 @each_family
 @virtual
 async def test_a_circle_is_followed_round_and_round(family: Family) -> None:

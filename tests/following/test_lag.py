@@ -26,6 +26,7 @@ def rows() -> dict[str, dict[str, Any]]:
     return {row["kind"]: row for row in json.loads(done.stdout)["rows"]}
 
 
+@pytest.mark.full
 def test_a_magician_is_five_times_less_behind_than_with_each_target_queued(rows: dict[str, dict[str, Any]]) -> None:
     queued = rows["Magician, queued"]["lag_p50_ms"]
     for way in ("Magician", "Magician, clear", "Magician, 50 %", "Magician, workspace"):

@@ -101,6 +101,7 @@ async def test_a_pose_turns_the_tool() -> None:
     assert scene.pieces["red"].on == "tool of"
 
 
+@pytest.mark.full
 @virtual
 async def test_a_pallet_is_filled() -> None:
     places = [(250, -90), (250, -45), (250, 0), (250, 45)]

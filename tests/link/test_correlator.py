@@ -18,6 +18,7 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from quick_suite import examples
 
 from dobot_async._core.link.correlator import Correlator, Outcome, Request
 from dobot_async.errors import ConnectionLost, ProtocolError
@@ -544,7 +545,7 @@ class StreamMachine(RuleBasedStateMachine):
         self.what_is_lost_will_not_be_answered()
 
 
-StreamMachine.TestCase.settings = settings(max_examples=300, stateful_step_count=50, deadline=None)
+StreamMachine.TestCase.settings = settings(max_examples=examples(300), stateful_step_count=50, deadline=None)
 TestStream = StreamMachine.TestCase
 
 
@@ -724,5 +725,5 @@ class DatagramMachine(RuleBasedStateMachine):
         assert len(self.correlator) == 0
 
 
-DatagramMachine.TestCase.settings = settings(max_examples=300, stateful_step_count=50, deadline=None)
+DatagramMachine.TestCase.settings = settings(max_examples=examples(300), stateful_step_count=50, deadline=None)
 TestDatagrams = DatagramMachine.TestCase

@@ -30,6 +30,7 @@ from link_line import (
     question,
     start,
 )
+from quick_suite import examples
 from virtual import run_virtual
 
 from dobot_async._core.link.link import Link
@@ -261,7 +262,7 @@ async def test_what_must_not_be_repeated_is_sent_once(fate: float | None) -> Non
 
 
 @given(late=st.floats(0.0, 1.49), others=st.lists(st.floats(0.0, 1.4), max_size=4))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_a_question_whose_answer_comes_in_time_does_not_fail(late: float, others: list[float]) -> None:
     async def scenario() -> None:
         async with line() as (link, wire):
@@ -428,7 +429,7 @@ delays = st.sampled_from([LATENCY, LATENCY, 0.0, 0.03, 0.1, 0.3, 0.6, 1.6, 2.5, 
     in_flight=st.sampled_from([1, 2, 8]),
 )
 @example([0.6, None, 0.6, None, 0.6, 0.6], [0.02] * 5, [TIME] * 8, 8)
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 def test_no_question_gets_an_answer_to_an_earlier_one(
     fates: list[float | None], impatience: list[float | None], keys: list[Any], in_flight: int
 ) -> None:

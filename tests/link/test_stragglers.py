@@ -129,6 +129,7 @@ async def ask_densely(link: Link[Frame], wire: Line, seconds: float, patience: f
     return answered, failed, stale
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(6))
 async def test_no_answer_to_dense_questions_is_stale(seed: int) -> None:
     wire = StragglingLine(Random(seed), 70)
@@ -154,6 +155,7 @@ async def test_a_question_with_two_replies_is_asked_again_and_the_guard_stays() 
             assert len(wire.times(TIME.id)) == sent + 2
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(3))
 async def test_who_gives_up_early_leaves_nothing_for_who_comes_next(seed: int) -> None:
     wire = StragglingLine(Random(seed), 70)
@@ -169,6 +171,7 @@ async def test_the_guard_costs_nothing_while_nothing_is_lost() -> None:
         assert (len(wire.sent), failed, stale) == (answered, 0, 0)
 
 
+@pytest.mark.full
 async def test_the_guard_costs_little_on_a_line_that_loses_much() -> None:
     random = Random(1)
     async with line() as (link, wire):

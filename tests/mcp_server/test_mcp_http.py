@@ -72,6 +72,7 @@ async def status(port: int, headers: dict[str, str | None] | None = None, body: 
         return (await head(reader))[0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("mode", ["legacy", "auto"])
 async def test_tools_are_called_by_http(mode: str) -> None:
     async with rig() as r, serve_http(r.server, ("127.0.0.1", 0)) as url, Client(url, mode=mode) as client:
@@ -220,6 +221,20 @@ async def test_who_does_not_say_what_he_wants_holds_no_place(begun: str, monkeyp
 
         assert await status(port) == 200
         assert not r.sim.arm.executed
+
+
+async def test_who_opens_very_many_connections_keeps_nobody_out() -> None:
+    async with served() as (r, port), Client(f"http://127.0.0.1:{port}/mcp") as client:
+        silent = [await asyncio.open_connection("127.0.0.1", port) for _ in range(300)]
+        async with asyncio.timeout(IN_TIME):
+            assert await status(port) == 200
+            assert not (await client.call_tool("move", FAR)).is_error
+            with suppress(ConnectionError):
+                assert await silent[0][0].read() == b""
+
+        assert moves(r.sim)
+        for _, writer in silent:
+            writer.transport.abort()
 
 
 async def test_an_answer_has_no_deadline_nor_a_request_that_comes_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -157,6 +157,7 @@ def running(number: int) -> bool:
         return False
 
 
+@pytest.mark.full
 async def test_a_server_that_is_killed_leaves_it_to_the_bridge_to_stop_the_arm() -> None:
     async with (
         simulate(listen=TCP, speed=1) as sim,
@@ -169,6 +170,7 @@ async def test_a_server_that_is_killed_leaves_it_to_the_bridge_to_stop_the_arm()
         await stands(sim)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 async def test_a_signal_ends_it_whatever_its_client_does(number: signal.Signals) -> None:
     async with simulate(listen=TCP, speed=1) as sim, served(sim.url, "--allow-motion") as talk:
@@ -181,6 +183,7 @@ async def test_a_signal_ends_it_whatever_its_client_does(number: signal.Signals)
         assert errors.decode().strip() == "interrupted; the arm was told to stop"
 
 
+@pytest.mark.full
 async def test_a_cancelled_call_stops_the_arm() -> None:
     async with simulate(listen=TCP, speed=1) as sim, served(sim.url, "--allow-motion") as talk:
         await talk.hello()
@@ -191,6 +194,7 @@ async def test_a_cancelled_call_stops_the_arm() -> None:
         assert state["result"]["structuredContent"]["doing"] is None
 
 
+@pytest.mark.full
 async def test_a_client_that_does_not_read_holds_up_neither_the_motion_nor_the_end() -> None:
     async with simulate(listen=TCP, speed=20) as sim, served(sim.url, "--allow-motion") as talk:
         await talk.hello()
@@ -224,6 +228,7 @@ GARBAGE = (
 )
 
 
+@pytest.mark.full
 async def test_nonsense_moves_nothing_and_the_next_call_is_right() -> None:
     async with simulate(listen=TCP, speed=20) as sim, served(sim.url, "--allow-motion") as talk:
         await talk.hello()
@@ -238,6 +243,7 @@ async def test_nonsense_moves_nothing_and_the_next_call_is_right() -> None:
         assert moves(sim) == [(220, 0, 40)]
 
 
+@pytest.mark.full
 async def test_a_line_without_an_end_cuts_its_client_off() -> None:
     async with simulate(listen=TCP, speed=20) as sim, served(sim.url) as talk:
         await talk.hello()

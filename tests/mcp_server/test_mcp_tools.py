@@ -250,6 +250,7 @@ async def test_an_ultraarm_goes_no_faster_either() -> None:
         assert max(speeds) <= 40
 
 
+@pytest.mark.cases(1)
 @MODES
 async def test_a_plan_tells_what_could_not_be_done_and_shows_the_way(mode: str) -> None:
     async with rig() as r, Client(r.server, mode=mode) as client:

@@ -198,6 +198,7 @@ async def test_the_state_of_an_arm_is_told_and_home_assistant_finds_it() -> None
     json.loads(components["dobot_arm_lease"]["payload_on"])
 
 
+@pytest.mark.full
 async def test_what_home_assistant_sends_moves_the_arm() -> None:
     """Its switch takes the lease, and its button homes the arm, twice delivered and once done."""
     async with hall() as broker, ear(broker.port) as heard, simulate("magician", speed=20) as sim:
@@ -275,6 +276,7 @@ async def test_a_session_that_is_not_heard_of_any_more_stops_the_arm() -> None:
             assert (await heard.until("dobot/arm/lease", lambda told: told["holder"] is None)) == {"holder": None}
 
 
+@pytest.mark.full
 async def test_a_lease_that_is_taken_again_in_time_goes_on() -> None:
     async with hall() as broker, ear(broker.port) as heard, simulate("magician", speed=1) as sim:
         async with running(broker.port, sim):
@@ -328,6 +330,7 @@ async def test_a_broker_that_is_lost_stops_the_arm_and_comes_back() -> None:
             assert (await heard.do("one", do="take_lease", seconds=60))["ok"]
 
 
+@pytest.mark.full
 async def test_the_last_will_tells_of_a_gateway_that_is_gone_without_a_word() -> None:
     async with hall() as broker, ear(broker.port) as heard, simulate("magician", speed=20) as sim:
         relay = await asyncio.start_server(lambda r, w: through(r, w, broker.port), "127.0.0.1", 0)
@@ -357,6 +360,7 @@ async def through(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, po
     await asyncio.gather(pass_on(reader, onward), pass_on(other, writer))
 
 
+@pytest.mark.full
 async def test_a_command_that_the_broker_has_kept_is_not_obeyed() -> None:
     async with hall() as broker, ear(broker.port) as heard, simulate("magician", speed=20) as sim:
         await heard.say({"session": "one", "id": "old", "do": "take_lease"}, retain=True)
@@ -366,6 +370,7 @@ async def test_a_command_that_the_broker_has_kept_is_not_obeyed() -> None:
             assert gateway.holders == {"arm": "two"}
 
 
+@pytest.mark.full
 async def test_an_arm_that_does_not_answer_is_not_available() -> None:
     async with hall() as broker, ear(broker.port) as heard, simulate("magician", speed=20) as sim:
         async with running(broker.port, sim):
@@ -407,6 +412,7 @@ GARBAGE = (
 )
 
 
+@pytest.mark.full
 async def test_nonsense_moves_nothing_and_the_next_command_is_right() -> None:
     async with hall() as broker, ear(broker.port) as heard, simulate("magician", speed=20) as sim:
         async with running(broker.port, sim):
@@ -422,6 +428,7 @@ async def test_nonsense_moves_nothing_and_the_next_command_is_right() -> None:
             assert set(refused) == {None, *(f"g{number}" for number in range(2, 12))}
 
 
+@pytest.mark.full
 async def test_arms_of_a_cell_have_topics_of_their_own() -> None:
     async with hall() as broker, ear(broker.port) as heard:
         async with simulate("magician", speed=20) as left, simulate("ultraarm", speed=20) as right:

@@ -79,6 +79,7 @@ def test_what_is_imported_is_declared() -> None:
     assert not missing, "declare it, as a dependency or in an extra"
 
 
+@pytest.mark.full
 def test_what_is_declared_is_imported() -> None:
     unused = CORE.union(*OPTIONAL.values()) - third_party().keys()
     assert not unused, "no module of the package imports it"
@@ -116,6 +117,7 @@ def test_an_extra_that_is_missing_is_named(extra: str) -> None:
     assert any(way in source for source in sources for way in ways)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is no D-Bus to simulate")
 def test_a_simulated_ble_module_names_its_extra() -> None:
     program = """

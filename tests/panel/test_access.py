@@ -288,6 +288,7 @@ async def test_wrong_arguments_move_nothing(rig: Shown, do: str, more: dict[str,
     assert not [each for each in rig.sim.arm.executed if each.command.moves or each.command is c.SET_END_EFFECTOR_LASER]
 
 
+@pytest.mark.full
 async def test_a_page_that_floods_is_sent_away(rig: Shown) -> None:
     async with page(rig) as one, page(rig, Role.VIEWER) as other:
         await one.get("take_lease", arm="arm")

@@ -366,6 +366,7 @@ async def test_stops_without_end_are_bounded_and_leave_others_their_stop() -> No
         assert await stands(sim)
 
 
+@pytest.mark.full
 async def test_a_bad_line_and_a_page_that_comes_and_goes_leave_no_motion_without_a_hand() -> None:
     """An hour of it, in virtual time, with 2 percent of all messages lost."""
     async with (

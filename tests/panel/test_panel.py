@@ -65,6 +65,7 @@ async def test_a_page_is_told_what_there_is(rig: Shown) -> None:
         assert (alarm["name"], alarm["harmless"]) == ("COMMON_RESET", True)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("model", "kind", "pose", "joints"),
     [

@@ -26,7 +26,7 @@ CHILD = Path(__file__).with_name("promise_child.py")
 SLOW = 0.1
 LIMIT = 30.0  # real seconds; only so that nothing hangs
 
-pytestmark = pytest.mark.timeout(120)
+pytestmark = [pytest.mark.timeout(120), pytest.mark.full]
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,7 @@ def programs() -> Mapping[tuple[str, str], Program]:
     return asyncio.run(run_all())
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("call", CALLS)
 @pytest.mark.parametrize("family", [family.name for family in FAMILIES])
 def test_an_interrupt_on_a_dead_line_is_a_keyboard_interrupt(

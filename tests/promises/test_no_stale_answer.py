@@ -19,6 +19,7 @@ pytestmark = pytest.mark.timeout(100)
 ANSWERS = 500
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_no_answer_is_another_questions(kind: Kind) -> None:
     tally = tally_of(kind, ANSWERS)
@@ -26,6 +27,7 @@ def test_no_answer_is_another_questions(kind: Kind) -> None:
     assert tally.stale == 0, tally
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind.most], ids=lambda kind: kind.name)
 def test_an_answer_costs_no_more_frames_than_it_takes(kind: Kind) -> None:
     assert kind.most

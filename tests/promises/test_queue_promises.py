@@ -229,6 +229,7 @@ async def test_each_call_on_a_lost_link_gets_an_error_of_its_own(family: Family)
 # Memory is bounded.
 
 
+@pytest.mark.full
 @each_family
 @on_virtual_clock
 async def test_commands_whose_motions_nobody_keeps_need_no_memory(family: Family) -> None:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import asyncio
 import gc
 from collections.abc import Coroutine, Sequence
+from contextlib import suppress
 from typing import Any
 
 import pytest
 from fake_executor import GO, LATENCY, SET, FakeExecutor, Step, now, queue_over
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual
 
 from dobot_async._core.queue.batch import BatchBuilder, batch
+from dobot_async._core.queue.executor import MotionSource
 from dobot_async._core.queue.motion import Motion
 from dobot_async._core.queue.queue import MotionQueue
 from dobot_async.errors import (
@@ -170,6 +173,7 @@ async def test_update_tells_without_anybody_who_waits() -> None:
         assert motion.ended
 
 
+@pytest.mark.full
 async def test_what_nobody_awaits_fills_no_memory() -> None:
     executor = FakeExecutor(capacity=10)
     async with queue_over(executor) as queue:
@@ -309,6 +313,37 @@ async def test_a_stop_ends_all_at_once_and_stops_the_arm() -> None:
         assert queue.pending == 0
         assert await ends_of(motions) == ["MotionStopped"] * 2
         assert executor.done == []
+
+
+class SlowToEnd(FakeExecutor):
+    """Brings to its end what it has begun to send when it is cancelled.
+
+    Attributes:
+        ended_at: When that was.
+    """
+
+    ended_at = 0.0
+
+    async def submit(self, source: MotionSource) -> None:
+        try:
+            await super().submit(source)
+        except asyncio.CancelledError:
+            for _ in range(10):
+                with suppress(asyncio.CancelledError):
+                    await asyncio.sleep(LATENCY)
+
+            self.ended_at = now()
+            raise
+
+
+async def test_the_queue_is_emptied_behind_what_was_still_being_sent() -> None:
+    executor = SlowToEnd()
+    async with queue_over(executor) as queue:
+        call = start(put(queue, "under way", 1.0))
+        await asyncio.sleep(LATENCY / 2)
+        await queue.stop()
+        assert 0 < executor.ended_at <= executor.clears[-1]
+        await asyncio.gather(call, return_exceptions=True)
 
 
 async def test_clear_empties_the_queue_and_does_not_halt() -> None:
@@ -877,7 +912,7 @@ class Program:
 
 
 @given(st.lists(steps, max_size=25), st.sampled_from([1, 2, 1000]))
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 def test_any_program_is_sent_once_and_in_order_and_all_end(script: Any, capacity: int) -> None:
     async def scenario() -> None:
         executor = FakeExecutor(capacity)

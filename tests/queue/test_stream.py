@@ -308,6 +308,7 @@ async def test_what_is_no_step_is_refused() -> None:
 # Arms
 
 
+@pytest.mark.full
 async def test_a_magician_draws_a_path_of_any_length() -> None:
     async with simulate() as sim, Magician.connect(sim.url) as arm:
         points = [(200 + 20 * (number % 2), float(number % 50), 40.0) for number in range(100)]

@@ -77,6 +77,7 @@ async def test_a_light_beam_sees_a_piece_pass() -> None:
         assert scene.pieces["red"].position[0] == pytest.approx(260, abs=2)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("pause", [0.001, 0.02, 1.7])
 @virtual
 async def test_the_arm_itself_waits_for_a_beam_at_a_pin(pause: float) -> None:

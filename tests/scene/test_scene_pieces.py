@@ -202,6 +202,7 @@ async def test_a_closed_gripper_takes_nothing() -> None:
     assert [each.kind for each in scene.events] == ["crash"]
 
 
+@pytest.mark.full
 @virtual
 async def test_the_arm_is_where_its_mount_says() -> None:
     """The arm stands turned by 90 degrees, on a rail that goes along x of the scene."""
@@ -221,6 +222,7 @@ async def test_the_arm_is_where_its_mount_says() -> None:
     assert place(scene.pieces["red"]) == (1000, 350, 0)
 
 
+@pytest.mark.full
 @virtual
 async def test_an_arm_on_no_rail_stays_where_it_stands() -> None:
     """Whatever its program says of a rail."""
@@ -235,6 +237,7 @@ async def test_an_arm_on_no_rail_stays_where_it_stands() -> None:
     assert scene.pieces["red"].on == "tool of"
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("mount", "at"), [(Mount(), (250, 0)), (Mount(rail_yaw=90), (250, 120))])
 @virtual
 async def test_an_arm_that_nobody_homed_goes_beside(mount: Mount, at: tuple[float, float]) -> None:

@@ -48,6 +48,7 @@ async def test_a_piece_goes_from_hand_to_hand() -> None:
     assert scene.pieces["red"].position == pytest.approx((300, 100, -138), abs=0.05)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("first", ["left", "right"])
 @virtual
 async def test_who_is_read_first_decides_nothing(first: str) -> None:
@@ -78,6 +79,7 @@ async def test_who_is_read_first_decides_nothing(first: str) -> None:
     assert scene.pieces["red"].on == "tool of left"
 
 
+@pytest.mark.full
 @virtual
 async def test_arms_of_two_families_share_a_scene() -> None:
     """The ultraArm stands on something, so that the table is 62 mm below its origin."""
@@ -106,6 +108,7 @@ async def test_arms_of_two_families_share_a_scene() -> None:
     assert scene.pieces["red"].position == pytest.approx((290, -100, -138), abs=0.1)
 
 
+@pytest.mark.full
 @virtual
 async def test_a_scene_outlives_its_arms() -> None:
     """Another arm finds everything where it was left."""
@@ -221,6 +224,7 @@ async def watched(step: float) -> tuple[Event, ...]:
         return scene.events
 
 
+@pytest.mark.full
 async def test_how_often_somebody_looks_changes_nothing() -> None:
     """A reader that asks a thousand times a second, and one that comes when all is over."""
     events = await watched(20)

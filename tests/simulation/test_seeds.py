@@ -40,6 +40,7 @@ HARD_CELLS = {
 """The same of the scenarios of several arms."""
 
 
+@pytest.mark.cases(3)
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
 @pytest.mark.parametrize("first", range(0, SEEDS, BLOCK))
 def test_seeds(first: int) -> None:
@@ -57,6 +58,7 @@ def test_seeds_that_once_broke_a_promise(seed: int) -> None:
     run_seed(seed)
 
 
+@pytest.mark.full
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
 @pytest.mark.parametrize(("of", "seed"), HARD_CELLS, ids=HARD_CELLS.values())
 def test_cells_that_once_broke_a_promise(of: str, seed: int) -> None:

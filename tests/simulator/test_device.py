@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 
 from dobot_async.simulator.device.device import Device
 from dobot_async.simulator.device.path import joint_segment, travel
@@ -555,6 +556,7 @@ def test_the_hook_may_clear_while_another_ends() -> None:
     assert bench.names == [("jog", "aborted"), ("wait", "aborted")]
 
 
+@pytest.mark.full
 def test_ten_thousand_points() -> None:
     bench = Bench()
     device = bench.device
@@ -634,7 +636,7 @@ def play(script: list[tuple[float, str]], options: DeviceOptions, look: Callable
     return answers, bench.until(now + 100.0).executed, device.joints, device.alarms, device.left_space
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(scripts, option_sets, st.lists(st.tuples(st.floats(0, 1), st.sampled_from(LOOKS)), max_size=8))
 def test_looking_changes_nothing(
     script: list[tuple[float, str]], options: DeviceOptions, looks: list[tuple[float, Callable[[Device], Any]]]
@@ -649,7 +651,7 @@ def test_looking_changes_nothing(
     assert play(script, options, look_often) == play(script, options, lambda device, begin, end: None)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(scripts.filter(lambda script: all(verb != "power" for _, verb in script)), option_sets)
 def test_the_record_is_in_order(script: list[tuple[float, str]], options: DeviceOptions) -> None:
     executed: list[Executed]

@@ -22,6 +22,7 @@ import anyio
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual, virtual
 
 from dobot_async import ConnectFailed, IOFunction, Magician
@@ -289,6 +290,7 @@ async def test_unplug_forgets_half_a_datagram_stream_and_what_is_on_the_way(hear
         assert (await ask(transport, GET_POSE, POSE_REPLY))[3] == GET_POSE[3]
 
 
+@pytest.mark.cases(1)
 @everywhere
 async def test_nothing_is_left(listen: str, heard: bytearray) -> None:
     """Neither by a simulation that nobody used, nor with clients and messages on the way."""
@@ -371,6 +373,7 @@ async def test_more_udp_clients_than_are_remembered() -> None:
 # Clients that do not read.
 
 
+@pytest.mark.full
 async def test_a_tcp_client_that_does_not_read_waits_with_its_requests() -> None:
     """Its replies would fill the memory; and none of them may be lost."""
     total = 60_000
@@ -886,7 +889,7 @@ def carried(messages: Iterable[bytes], seed: int, pause: float, *, ordered: bool
     return arrived
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 @given(data=st.binary(min_size=1, max_size=50), seed=st.integers(0, 2**32))
 def test_each_fault_does_what_it_says(data: bytes, seed: int) -> None:
     def arrives(**faults: Any) -> list[bytes]:

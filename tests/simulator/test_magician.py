@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 
 from dobot_async._core.protocol.layouts import NOTHING, Counted, Lenient, Text
 from dobot_async._core.protocol.wire import Command, Field, Layout, Number, Record
@@ -234,7 +235,7 @@ def get(bench: Bench, row: Row, value: Any) -> Any:
 
 @every_register
 @given(data=st.data())
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=examples(10), deadline=None)
 def test_what_was_set_is_what_is_got(row: Row, data: st.DataObject) -> None:
     bench = Bench()
     first, second = data.draw(values(row.request)), data.draw(values(row.request))
@@ -251,7 +252,7 @@ def test_what_was_set_is_what_is_got(row: Row, data: st.DataObject) -> None:
 
 @every_register
 @given(data=st.data())
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=examples(5), deadline=None)
 def test_power_brings_the_defaults_back_except_in_flash(row: Row, data: st.DataObject) -> None:
     bench = Bench()
     getter = c.BY_KEY[row.id, False]
@@ -266,7 +267,7 @@ def test_power_brings_the_defaults_back_except_in_flash(row: Row, data: st.DataO
 
 @pytest.mark.parametrize("row", [row for row in c.ALL if not row.write], ids=lambda row: row.name)
 @given(data=st.data())
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=examples(3), deadline=None)
 def test_everything_can_be_read(row: Row, data: st.DataObject) -> None:
     Bench().ask(row, data.draw(values(row.request)))
 
@@ -1349,7 +1350,7 @@ chunks = st.lists(
 
 
 @given(chunks, st.sampled_from(["halt", "continue"]), st.integers(1, 40))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_anything_is_survived_and_nothing_grows(
     script: list[tuple[bytes, float]], on_fault: Any, capacity: int
 ) -> None:
@@ -1399,7 +1400,7 @@ def test_programs_do_not_grow_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @given(chunks.map(lambda script: b"".join(data for data, _ in script)), st.data())
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 def test_bytes_may_be_cut_anywhere(stream: bytes, data: st.DataObject) -> None:
     whole, cut = Bench(), Bench()
     answered = b""
@@ -1422,7 +1423,7 @@ LOOKS: list[Callable[[Bench], Any]] = [
 
 
 @given(st.lists(st.tuples(st.floats(0, 12), st.sampled_from(LOOKS)), max_size=12))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 def test_watching_changes_nothing(looks: list[tuple[float, Callable[[Bench], Any]]]) -> None:
     watched, alone = Bench(), Bench()
     for bench in (watched, alone):
@@ -1442,6 +1443,7 @@ def test_watching_changes_nothing(looks: list[tuple[float, Callable[[Bench], Any
     assert watched.arm.pose == alone.arm.pose
 
 
+@pytest.mark.full
 def test_ten_thousand_points() -> None:
     bench = Bench()
     bench.move(c.PTPMode.MOVJ_XYZ, 260, 0, 0)

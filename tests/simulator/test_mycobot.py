@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mycobot_values import values
+from quick_suite import examples
 
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.mycobot import commands as c
@@ -43,7 +44,7 @@ class Bench:
 
 
 @pytest.mark.parametrize("name", list(MODELS))
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(data=st.data())
 def test_joints_that_are_near_are_found_for_each_point(name: str, data: st.DataObject) -> None:
     model, solver = MODELS[name], KINEMATICS[name]
@@ -260,7 +261,7 @@ def test_what_does_not_fit_is_left_unanswered() -> None:
 
 
 @pytest.mark.parametrize("name", list(MODELS))
-@settings(max_examples=12)
+@settings(max_examples=examples(12))
 @given(data=st.data())
 def test_any_request_is_answered_as_its_row_says(name: str, data: st.DataObject) -> None:
     bench = Bench(name, quirks=MyCobotQuirks(acknowledges=True, transponder=False))
@@ -277,7 +278,7 @@ def test_any_request_is_answered_as_its_row_says(name: str, data: st.DataObject)
             assert bench.arm.counters.unfit
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(st.lists(st.binary(max_size=40), max_size=8))
 def test_no_bytes_break_an_arm(pieces: list[bytes]) -> None:
     bench = Bench()
@@ -324,7 +325,7 @@ def test_an_elbow_of_a_stretched_arm_is_nowhere_and_one_beyond_the_joints_limits
         bench.send(c.CLEAR_ERROR_INFORMATION)
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 @given(st.data())
 def test_an_elbow_is_where_it_was_told_to_be(data: st.DataObject) -> None:
     model, chain = MODELS["myarm300"], KINEMATICS["myarm300"]

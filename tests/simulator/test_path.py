@@ -9,6 +9,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 
 from dobot_async.arms.magician.kinematics import JointLimits, Kinematics, Unreachable
 from dobot_async.simulator.device.curve import Arc, LineSegment, arc, circle
@@ -360,7 +361,7 @@ def test_a_jump_in_time() -> None:
     assert device.executed[0].finished == pytest.approx(total)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 @given(st.lists(st.floats(0, 1.2), max_size=10))
 def test_a_line_that_leaves_the_reach_ends_the_same_however_it_is_watched(looks: list[float]) -> None:
     device, now = device_at(20, -200, 0, -90)

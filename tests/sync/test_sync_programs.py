@@ -85,6 +85,7 @@ with Magician.connect(url) as arm:
 """
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("body", [BLOCKED, SLEEPING], ids=["in a call", "between calls"])
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 async def test_a_signal_stops_the_arm_and_ends_the_program(name: str, body: str) -> None:
@@ -173,6 +174,7 @@ async def test_an_exception_stops_the_arm() -> None:
         stands(sim)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("end", ["", "sys.exit(3)", "1 / 0"])
 async def test_a_block_that_was_never_left_is_left_at_the_end_of_the_program(end: str) -> None:
     body = f"arm = Magician.connect(url).__enter__()\narm.queue.move_to({FAR})\nmoving(arm)\n{end}"
@@ -183,6 +185,7 @@ async def test_a_block_that_was_never_left_is_left_at_the_end_of_the_program(end
         stands(sim)
 
 
+@pytest.mark.full
 async def test_the_end_of_the_program_stops_the_arm_of_a_daemon_thread() -> None:
     body = f"""
         begun = threading.Event()
@@ -203,6 +206,7 @@ async def test_the_end_of_the_program_stops_the_arm_of_a_daemon_thread() -> None
         stands(sim)
 
 
+@pytest.mark.full
 async def test_sigterm_stops_the_arm_that_another_thread_drives_and_that_thread_ends() -> None:
     body = f"""
         def work():
@@ -222,6 +226,7 @@ async def test_sigterm_stops_the_arm_that_another_thread_drives_and_that_thread_
         stands(sim)
 
 
+@pytest.mark.full
 async def test_a_program_that_handles_sigterm_itself_is_left_alone() -> None:
     body = f"""
         def mine(number, frame):
@@ -240,6 +245,7 @@ async def test_a_program_that_handles_sigterm_itself_is_left_alone() -> None:
         assert code == 7
 
 
+@pytest.mark.full
 async def test_after_the_last_block_signals_and_threads_are_as_before() -> None:
     body = """
         before = [signal.getsignal(each) for each in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT)]

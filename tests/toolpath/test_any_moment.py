@@ -20,7 +20,7 @@ from burner import Burner, ends_of
 
 from dobot_async import Magician, MotionStopped
 from dobot_async.cli.drawing_job import CommandDrawing
-from dobot_async.simulator import Simulation, simulate
+from dobot_async.simulator import Faults, Simulation, simulate
 from dobot_async.toolpath import Stroke, Toolpath, WorkPlane, estimate
 
 ENGRAVINGS = int(os.environ.get("ENGRAVINGS", "4"))
@@ -65,11 +65,22 @@ async def by_ctrl_c(run: Awaitable[None], _: Magician, seconds: float) -> None:
     await run
 
 
+async def by_cancellations(run: Awaitable[None], _: Magician, seconds: float) -> None:
+    """The task is cancelled, and twice more while it ends."""
+    task = asyncio.ensure_future(run)
+    for pause in (seconds, 0.001, 0.02):
+        await asyncio.sleep(pause)
+        task.cancel()
+
+    await task
+
+
 Way = Callable[[Awaitable[None], Magician, float], Awaitable[None]]
 WAYS: dict[str, tuple[Way, type[BaseException]]] = {
     "stop": (by_stop, MotionStopped),
     "error": (by_error, BaseExceptionGroup),
     "ctrl-c": (by_ctrl_c, KeyboardInterrupt),
+    "cancellations": (by_cancellations, asyncio.CancelledError),
 }
 
 
@@ -118,7 +129,7 @@ def test_whenever_it_is_ended_the_laser_is_off_nothing_moves_and_the_rest_is_bur
 
     async def run() -> None:
         nonlocal looked
-        async with simulate(seed=number) as sim:
+        async with simulate(seed=number, faults=Faults(latency=0.002)) as sim:
             burner = Burner(sim)
             try:
                 await interrupted(sim, path, way, moment, {})

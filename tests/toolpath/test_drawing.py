@@ -96,6 +96,7 @@ def furthest(drawn: list[tuple[float, float]], lines: list[Line], gap: float) ->
     return missed(np.array(drawn), lines), missed(samples(lines, 0.2), [[point] for point in drawn]) - gap
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "make", [lambda: read_svg(FILES / "shapes.svg"), lambda: write_text("Hello,\nWorld", 20, font="scripts")]
 )
@@ -143,6 +144,7 @@ async def test_a_power_for_each_point_burns_on_the_way_to_it() -> None:
     assert max(x for x, _ in burnt) == pytest.approx(50.1, abs=0.05)
 
 
+@pytest.mark.full
 @virtual
 async def test_nothing_is_between_the_points_of_a_stroke() -> None:
     async with magician() as (sim, arm):
@@ -154,6 +156,7 @@ async def test_nothing_is_between_the_points_of_a_stroke() -> None:
         assert set(names[2:]) == {"SetPTPCmd", "SetCPCmd"}
 
 
+@pytest.mark.full
 @virtual
 async def test_the_arm_never_halts_within_a_stroke() -> None:
     path = Toolpath.of([(40 + 40 * math.cos(i / 40), 40 + 40 * math.sin(i / 40)) for i in range(252)])
@@ -260,6 +263,7 @@ async def test_a_progress_that_fails_does_not_stop_the_drawing() -> None:
         assert len(sim.arm.executed) > 10
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("tool", ["pen", "laser"])
 @pytest.mark.parametrize("how", ["stop", "arm.stop", "cancel", "alarm", "timeout"])
 def test_on_every_way_out_the_arm_stands_its_laser_is_off_and_it_goes_on_from_there(tool: Any, how: str) -> None:
@@ -366,6 +370,7 @@ async def test_a_lossy_line_draws_each_point_once() -> None:
         assert len(points) == len({(value.x, value.y) for value in points}) == 6
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("tool", ["pen", "laser"])
 def test_an_estimate_is_what_the_drawing_takes(tool: Any) -> None:
     @virtual
@@ -420,6 +425,7 @@ async def test_an_ultraarm_draws() -> None:
             await draw(arm, TWO.translate(200), plane)
 
 
+@pytest.mark.full
 @virtual
 async def test_an_ultraarm_engraves_and_its_laser_is_off_on_every_way_out() -> None:
     plane = WorkPlane.flat(180, -40, 20)
@@ -498,6 +504,7 @@ async def test_bad_arguments_are_told_before_a_byte_is_sent() -> None:
         assert sim.arm.counters.requests == requests
 
 
+@pytest.mark.full
 def test_many_short_ways_are_drawn_so_slowly_that_the_line_keeps_up() -> None:
     dense = Toolpath.of([(i * 0.1, (i % 2) * 0.1) for i in range(600)])
     slow, fast = estimate(dense, PAPER, tolerance=0), estimate(dense, PAPER, tolerance=0, rate=None)

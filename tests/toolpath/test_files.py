@@ -19,6 +19,7 @@ from geometry import FILES, Line, apart, lines_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageChops, ImageDraw, ImageFilter, ImageOps
+from quick_suite import examples
 
 from dobot_async.toolpath import (
     Toolpath,
@@ -68,6 +69,7 @@ def by_svgpathtools(name: str, scale: float, height: float, start: tuple[float, 
     return found
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("name", "scale", "height"), [("shapes.svg", 0.5, 80.0), ("paths.svg", PX, 100 * PX)])
 def test_svg_is_what_svgpathtools_reads(name: str, scale: float, height: float) -> None:
     assert apart(lines_of(read_svg(FILES / name)), by_svgpathtools(name, scale, height)) < CLOSE
@@ -114,7 +116,8 @@ def test_units_of_a_page(width: str, mm: float) -> None:
     assert read_svg(io.StringIO(text)).bounds == pytest.approx((0, 0, mm, mm))
 
 
-@settings(max_examples=60, deadline=None)
+@pytest.mark.full
+@settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.complex_numbers(max_magnitude=100), min_size=4, max_size=4), st.floats(0.002, 1))
 def test_curves_are_missed_by_no_more_than_the_tolerance(controls: Sequence[complex], tolerance: float) -> None:
     data = "M{} {}C{} {} {} {} {} {}".format(*(f"{n:.4f}" for c in controls for n in (c.real, c.imag)))
@@ -141,6 +144,7 @@ def by_ezdxf(name: str, scale: float, layers: set[str]) -> list[Line]:
     return found
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("name", "scale", "layers"), [("entities.dxf", 1.0, {"cut", "engrave", "0"}), ("blocks_inch.dxf", 25.4, {"0"})]
 )
@@ -223,7 +227,7 @@ def test_a_line_that_is_wrong_is_named(program: str, line: int, reason: str) -> 
     assert caught.value.place == f"line {line}"
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(st.text(st.sampled_from("GXYZIJRMSFN0123456789.-+ ();%\n\r\f\x85"), max_size=80))
 def test_any_text_is_a_program_or_names_a_line(text: str) -> None:
     found = wrong(lambda: read_gcode(io.StringIO(text)))
@@ -279,6 +283,7 @@ def test_what_is_wrong_in_svg_is_named_with_its_line(body: str, reason: str) -> 
     assert caught.value.place == "line 3"
 
 
+@pytest.mark.full
 def test_uses_that_multiply_are_refused() -> None:
     bombs = "".join(f'<g id="g{n}">{f"""<use href="#g{n + 1}"/>""" * 10}</g>' for n in range(8))
     bombs += '<g id="g8"><path d="M0 0H1"/></g>'

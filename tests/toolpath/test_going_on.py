@@ -70,6 +70,7 @@ async def interrupt(drawing: Drawing, arm: Any, how: str, seconds: float, how_to
     return True
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("how", WAYS_OUT)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_laser_burns_each_way_once_however_often_and_whenever_it_is_interrupted(how: str, seed: int) -> None:
@@ -108,6 +109,7 @@ def test_a_laser_burns_each_way_once_however_often_and_whenever_it_is_interrupte
     run_virtual(run())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pen_draws_again_what_it_was_interrupted_in_and_no_stroke_that_is_done(seed: int) -> None:
     path, chance = dashes(3), random.Random(seed)
@@ -145,6 +147,7 @@ def test_a_pen_draws_again_what_it_was_interrupted_in_and_no_stroke_that_is_done
     run_virtual(run())
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("how", ["alarm", "dead"])
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_not_known_to_be_done_is_burnt_again_and_nothing_is_left_out(how: str, seed: int) -> None:
@@ -191,6 +194,7 @@ async def until_it_stands(sim: Simulation) -> None:
         await asyncio.sleep(0.0005)
 
 
+@pytest.mark.full
 @virtual
 async def test_an_index_that_does_not_agree_with_the_place_is_not_believed() -> None:
     path = dashes()
@@ -232,6 +236,7 @@ async def test_where_to_begin_is_checked() -> None:
         assert burner.length == pytest.approx(10, abs=0.01)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_an_ultraarm_leaves_nothing_out_and_its_laser_is_off(seed: int) -> None:
     plane, chance = WorkPlane.flat(180, -40, 20), random.Random(seed)

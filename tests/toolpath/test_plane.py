@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 
 from dobot_async.arms.magician.commands import Pose
 from dobot_async.calibration import Calibration
@@ -167,7 +168,7 @@ def test_a_homography_is_found_from_four_pairs_and_more(seed: int, count: int) -
         assert found.to_pixel(*table(*pixel)) == pytest.approx(pixel, abs=1e-3)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=examples(40))
 @given(st.integers(0, 10_000), st.integers(8, 20))
 def test_outliers_are_found_and_told_in_spite_of_noise(seed: int, count: int) -> None:
     random = Random(seed)

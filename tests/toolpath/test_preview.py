@@ -103,6 +103,7 @@ def test_what_makes_no_picture_is_refused(options: dict[str, object]) -> None:
         preview(Toolpath())
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("library", "call"),
     [
@@ -126,6 +127,7 @@ def test_a_missing_library_is_an_import_error_that_names_the_extra(library: str,
     assert "pip install 'dobot-async[draw]'" in ran.stdout
 
 
+@pytest.mark.full
 def test_what_needs_no_library_works_without_the_extra() -> None:
     missing = ("svgelements", "ezdxf", "PIL", "HersheyFonts", "numpy")
     program = (

@@ -66,6 +66,7 @@ def halts(records: list[Executed], row: object) -> list[tuple[int, float]]:
     ]
 
 
+@pytest.mark.full
 @virtual
 async def test_ten_thousand_points_with_a_pen() -> None:
     path = rings(10_000, 20)
@@ -83,6 +84,7 @@ async def test_ten_thousand_points_with_a_pen() -> None:
         assert len(told) >= 15
 
 
+@pytest.mark.full
 @virtual
 async def test_a_laser_never_halts_at_all() -> None:
     path = rings(1_000, 4)
@@ -93,6 +95,7 @@ async def test_a_laser_never_halts_at_all() -> None:
         assert not halts(sim.arm.executed, m.SET_CPLE_CMD)
 
 
+@pytest.mark.full
 @virtual
 async def test_a_path_that_is_too_fine_for_the_line_is_drawn_more_slowly() -> None:
     path = Toolpath.of([(i * 0.05, 0.05 * (i % 2)) for i in range(400)])

@@ -13,6 +13,7 @@ import pytest
 from geometry import apart, lines_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 
 from dobot_async.toolpath import Matrix, Point, Stroke, Toolpath
 from dobot_async.toolpath.ordering import travel_of
@@ -157,7 +158,7 @@ def test_a_straight_way_of_many_points_becomes_one_of_two() -> None:
     assert Toolpath.of(line).simplify(0.01).strokes[0].points == (line[0], line[-1])
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(toolpaths, st.one_of(st.none(), points), st.booleans())
 def test_ordering_loses_and_doubles_no_stroke(path: Toolpath, start: Point | None, reverse: bool) -> None:
     found = path.order(start=start, merge=None, reverse=reverse)
@@ -166,7 +167,7 @@ def test_ordering_loses_and_doubles_no_stroke(path: Toolpath, start: Point | Non
     assert travel_of(found.strokes, start) <= travel_of(path.strokes, start) + 1e-9
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(
     st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3), st.integers(0, 3), st.integers(0, 3)), max_size=14),
     st.booleans(),
@@ -197,6 +198,7 @@ def test_a_comb_is_drawn_to_and_fro() -> None:
     assert teeth.order(start=(0, 60)).strokes[0].start == (0, 50)
 
 
+@pytest.mark.full
 def test_thousands_of_strokes_are_ordered_well() -> None:
     random = np.random.default_rng(1)
     path = Toolpath.of(*[[(x, y), (x + 1, y)] for x, y in random.uniform(0, 200, (3000, 2)).tolist()])

@@ -98,6 +98,7 @@ WAYS: dict[str, Way] = {
 }
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("model", PROTOS)
 def test_each_frame_is_found(model: str, way: str, lua: Path, said: dict[str, list[Said]], tmp_path: Path) -> None:
@@ -112,6 +113,7 @@ def test_each_frame_is_found(model: str, way: str, lua: Path, said: dict[str, li
         assert [str(int(each, 0)) for each in found] == ids
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("way", ["tcp", "udp", "usb"])
 def test_values_and_roles_are_told(way: str, lua: Path, said: dict[str, list[Said]], tmp_path: Path) -> None:
     packets = tshark(lua, write_pcap(tmp_path / "a.pcap", *WAYS[way]("magician", said["magician"])))
@@ -131,6 +133,7 @@ def test_values_and_roles_are_told(way: str, lua: Path, said: dict[str, list[Sai
     assert any(each.startswith("220.00") for each in values(line, "elephant_ultraarm.values"))
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("way", ["tcp", "udp", "usb"])
 @pytest.mark.parametrize("model", PROTOS)
 def test_frames_that_are_cut_or_run_together_are_found(
@@ -159,6 +162,7 @@ def test_what_is_no_frame_is_marked_and_hides_nothing(lua: Path, tmp_path: Path)
     assert values(packets, "_ws.expert.message").count("these bytes belong to no frame") >= 2
 
 
+@pytest.mark.full
 def test_another_port_is_chosen_by_decode_as(lua: Path, said: dict[str, list[Said]], tmp_path: Path) -> None:
     capture = write_pcap(tmp_path / "capture.pcap", *over_tcp([(True, b"?"), *said["magician"]], 4321))
     chosen = tshark(lua, capture, "-d", "tcp.port==4321,dobot_magician", "-o", "dobot_magician.port:4321")

@@ -1113,6 +1113,7 @@ async def test_no_motion_is_lost_or_doubled_wherever_the_link_breaks(
         assert arm.link.outages == 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(2))
 async def test_a_link_that_breaks_again_and_again(module: BleModule, sim: Simulation, seed: int) -> None:
     """Forty motions, and a break after every few steps on the way, whatever they are."""
@@ -1240,6 +1241,7 @@ async def test_without_a_daemon_the_rig_says_what_is_missing(monkeypatch: pytest
         await simulate(listen="ble").__aenter__()
 
 
+@pytest.mark.full
 async def test_the_command_line_offers_the_rig() -> None:
     program = [sys.executable, "-m", "dobot_async"]
     simulator = await asyncio.create_subprocess_exec(

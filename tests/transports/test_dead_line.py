@@ -162,6 +162,7 @@ async def fill(transport: Any) -> tuple[int, list[int]]:
     return number, cancelled
 
 
+@pytest.mark.cases(2)
 @each_peer
 async def test_a_cancelled_send_returns_at_once_and_cuts_no_frame(peer: Peer, tmp_path: Path) -> None:
     async with peer(tmp_path) as unread:

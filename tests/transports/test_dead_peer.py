@@ -70,6 +70,7 @@ def line(process: subprocess.Popen[str]) -> str:
     return process.stdout.readline().strip()
 
 
+@pytest.mark.full
 def test_a_network_that_goes_is_noticed_within_ten_seconds_on_both_sides(
     networks: tuple[str, str], tmp_path: Path
 ) -> None:

@@ -70,6 +70,7 @@ def run(program: str, cwd: Path | None = None) -> str:
     return done.stdout
 
 
+@pytest.mark.full
 def test_memory_tcp_and_udp_need_none_of_it(tmp_path: Path) -> None:
     *lines, left = run(RUN, tmp_path).splitlines()
     assert left == "[]"
@@ -84,6 +85,7 @@ def test_memory_tcp_and_udp_need_none_of_it(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_needs_it_says_so(what: str) -> None:
     call, error, message = REFUSED[what]
@@ -102,6 +104,7 @@ asyncio.run(main())
     assert message in printed
 
 
+@pytest.mark.full
 def test_the_command_line_needs_none_of_it() -> None:
     program = """
 from dobot_async.cli.main import cli

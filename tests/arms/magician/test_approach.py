@@ -135,6 +135,7 @@ async def test_an_arm_is_asked_seldom_on_its_way_and_often_near_its_end(go: Call
         assert arm.link.stats.sent - before < (move.finished - move.started) / 0.012
 
 
+@pytest.mark.full
 @virtual
 async def test_an_arm_that_was_paused_is_waited_for() -> None:
     async with simulate() as sim, Magician.connect(sim.url) as arm:

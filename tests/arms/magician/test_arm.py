@@ -113,6 +113,7 @@ async def test_a_batch_left_by_an_error_sends_nothing() -> None:
         assert done(sim, "SetPTPCmd") == []
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("capacity", [1, 2, 32])
 @virtual
 async def test_a_full_queue_is_back_pressure(capacity: int) -> None:

@@ -10,6 +10,7 @@ from typing import Any, cast
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 
 from dobot_async._core.protocol.layouts import NOTHING, Bytes, Count, Counted, Lenient, Text
 from dobot_async._core.protocol.wire import Command, Field, Layout, Number, Queueing, Record
@@ -126,7 +127,7 @@ def values(layout: Layout[Any] | Field) -> st.SearchStrategy[Any]:
 
 @every_row
 @given(data=st.data())
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 def test_row_round_trip(row: Row, data: st.DataObject) -> None:
     for layout in (row.request, row.reply):
         value = data.draw(values(layout))
@@ -139,7 +140,7 @@ def test_row_round_trip(row: Row, data: st.DataObject) -> None:
 
 @every_row
 @given(data=st.data())
-@settings(max_examples=5)
+@settings(max_examples=examples(5))
 def test_row_has_the_size_of_the_wire(row: Row, data: st.DataObject) -> None:
     key = row.id, row.write
     if key in VARIABLE:
@@ -152,7 +153,7 @@ def test_row_has_the_size_of_the_wire(row: Row, data: st.DataObject) -> None:
 
 @every_row
 @given(data=st.data())
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 def test_arbitrary_bytes_are_a_value_or_a_protocol_error(row: Row, data: st.DataObject) -> None:
     size = (WRITES if row.write else READS).get(row.id, 20)
     params = data.draw(st.binary(max_size=MAX_PARAMS) | st.binary(min_size=size, max_size=size))
@@ -167,7 +168,7 @@ def test_arbitrary_bytes_are_a_value_or_a_protocol_error(row: Row, data: st.Data
 
 @every_row
 @given(data=st.data())
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 def test_bad_fields_are_refused_before_bytes_exist(row: Row, data: st.DataObject) -> None:
     layout = row.request.layout if isinstance(row.request, Lenient) else row.request
     if not isinstance(layout, Record):

@@ -50,6 +50,7 @@ def spoil_nth(number: int, place: int) -> Spoil:
     return spoil
 
 
+@pytest.mark.full
 @virtual
 async def test_a_thousand_moves_on_a_terrible_line() -> None:
     faults = Faults(loss=0.2, corrupt=0.05, dup=0.05, latency=0.002, jitter=0.005)
@@ -97,6 +98,7 @@ async def test_a_spoilt_request_is_sent_again_even_if_it_ends_nowhere(lines: lis
         assert targets(sim) == [220]
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("late", [0.05, 0.3, 1.5, 2.5])
 @virtual
 async def test_a_late_reply_never_answers_a_later_call(lines: list[BadLine], late: float) -> None:
@@ -123,6 +125,7 @@ async def test_a_late_reply_never_answers_a_later_call(lines: list[BadLine], lat
         assert first.x != pytest.approx(240, abs=1)
 
 
+@pytest.mark.full
 @virtual
 async def test_several_late_replies_each_alone_never_answer_a_later_call(lines: list[BadLine]) -> None:
     async with simulate(speed=20) as sim, Magician.connect(sim.url) as arm:

@@ -217,6 +217,7 @@ async def test_a_rail_that_was_not_declared_is_named_and_nothing_is_sent() -> No
         assert sim.arm.executed == []
 
 
+@pytest.mark.full
 @virtual
 async def test_all_motions_go_along_the_rail() -> None:
     async with simulate(homed=True) as sim, Magician.connect(sim.url) as arm:

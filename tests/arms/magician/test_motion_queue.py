@@ -15,6 +15,7 @@ from typing import Any, Literal
 import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual
 
 from dobot_async import ArmAlarm, DobotError, Magician, MotionStopped, PTPMode, ReplyTimeout
@@ -301,7 +302,7 @@ async def perform(program: Program, step: tuple[Any, ...]) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
-@settings(max_examples=300, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(300), suppress_health_check=[HealthCheck.too_slow])
 @given(
     script=st.lists(steps, min_size=1, max_size=25),
     capacity=st.sampled_from([1, 2, 3, 4, ROOMY]),

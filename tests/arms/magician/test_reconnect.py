@@ -170,6 +170,7 @@ async def test_nothing_is_done_that_an_arm_was_told_before_it_was_switched_off()
                 await motion
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("days", [0.01, 10, 49.7, 120])
 @virtual
 async def test_an_arm_that_has_nothing_to_do_for_days_was_not_switched_off(days: float) -> None:
@@ -185,6 +186,7 @@ async def test_an_arm_that_has_nothing_to_do_for_days_was_not_switched_off(days:
         assert targets(sim)[1:] == [(200 + step, 0) for step in range(20)]
 
 
+@pytest.mark.full
 @virtual
 async def test_an_arm_that_is_paused_was_not_switched_off() -> None:
     async with simulate() as sim, Magician.connect(sim.url) as arm:

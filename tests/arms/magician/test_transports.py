@@ -381,6 +381,7 @@ def flood(data: bytes) -> Peer:
     return send_for_ever
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("kind", FLOODS)
 async def test_a_tcp_peer_that_never_stops_sending(kind: str) -> None:
     async with tcp_peer(flood(FLOODS[kind])) as url:
@@ -432,6 +433,7 @@ async def test_a_udp_peer_that_never_stops_sending(kind: str) -> None:
             await asyncio.wait([babbler])
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("listen", ["tcp", "pty"])
 @pytest.mark.parametrize("kind", FLOODS)
 async def test_a_flood_does_not_pile_up(kind: str, listen: str) -> None:

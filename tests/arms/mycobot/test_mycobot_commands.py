@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mycobot_values import values
+from quick_suite import examples
 
 from dobot_async._core.protocol.wire import Command, Queueing
 from dobot_async.arms.mycobot import commands as c
@@ -44,7 +45,7 @@ OF_MANUAL = {
 
 
 @pytest.mark.parametrize(("model", "row"), ROWS.values(), ids=IDS)
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 @given(data=st.data())
 def test_there_and_back(model: CobotModel, row: Row, data: st.DataObject) -> None:
     for layout in (row.request, row.reply):
@@ -57,7 +58,7 @@ def test_there_and_back(model: CobotModel, row: Row, data: st.DataObject) -> Non
 
 
 @pytest.mark.parametrize(("model", "row"), ROWS.values(), ids=IDS)
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 @given(params=st.binary(max_size=30))
 def test_any_bytes_are_a_value_or_a_protocol_error(model: CobotModel, row: Row, params: bytes) -> None:
     for layout in (row.request, row.reply):

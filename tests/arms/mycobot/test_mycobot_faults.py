@@ -10,6 +10,7 @@ import pytest
 from bad_line import BadLine, Spoil, bad_lines
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual, virtual
 
 from dobot_async.arms.mycobot import commands as c
@@ -151,7 +152,7 @@ async def test_text_of_the_m5_between_frames_is_junk() -> None:
 READINGS = ("get_angles", "get_coords", "get_encoders", "get_voltages", "is_moving", "get_tool")
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(
     cuts=st.lists(st.integers(1, 20), min_size=1, max_size=6),
     noise=st.lists(

@@ -227,6 +227,7 @@ async def test_who_leaves_a_program_stops_the_arm() -> None:
         assert caught.value.__notes__[0].startswith("line ")
 
 
+@pytest.mark.full
 @virtual
 async def test_a_long_program_does_not_fill_the_queue() -> None:
     async with simulate("ultraarm", homed=True, speed=50) as sim, UltraArm.connect(sim.url) as arm:

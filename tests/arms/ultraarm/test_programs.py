@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from quick_suite import examples
 from virtual import run_virtual
 
 from dobot_async import DobotError, UltraArm
@@ -124,7 +125,7 @@ def judge(program: Program) -> None:
             assert x in done
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(60), suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.lists(STEPS, min_size=1, max_size=12),
     st.sampled_from(["size", "ok", "nothing"]),
@@ -158,6 +159,7 @@ def test_any_program(steps: list[tuple[str, int, float]], acknowledge: Any, dept
     run_virtual(run())
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("first", [160, 180, 240, 260, 340])
 def test_late_replies_on_a_line_that_loses_some_make_no_motion_done(first: int) -> None:
     """A reply that comes alone may acknowledge another command, or tell of another time: the goals tell.

@@ -104,6 +104,7 @@ async def test_no_motion_is_done_before_its_time(quirks: UltraArmQuirks, count_e
         assert targets(sim) == [200 + step for step in range(12)]
 
 
+@pytest.mark.full
 @virtual
 async def test_two_hundred_moves_arrive_in_order_and_none_is_lost() -> None:
     async with simulate("ultraarm", homed=True, speed=20) as sim, UltraArm.connect(sim.url) as arm:

@@ -142,6 +142,7 @@ async def test_others_watch_while_one_moves_and_hear_that_they_may_not_move(ackn
         assert "moves the arm" in rig.told("refused")[0]
 
 
+@pytest.mark.full
 async def test_many_commands_arrive_in_order_and_once_while_others_read() -> None:
     async with bridged(speed=200) as rig, UltraArm.connect(rig.bridge.url) as arm, plain(rig.bridge.url) as other:
         reading = asyncio.create_task(read_for_ever(other))

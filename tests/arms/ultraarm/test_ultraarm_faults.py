@@ -230,6 +230,7 @@ async def test_a_command_that_is_cancelled_while_it_is_sent_is_settled_by_the_ne
             assert targets(sim) == [205, 220, 230]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("acknowledge", ["size", "ok"])
 @pytest.mark.parametrize("seed", range(8))
 def test_many_moves_on_a_terrible_line(seed: int, acknowledge: Any) -> None:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.full
+
 ROOT = Path(__file__).parents[3]
 SCRIPT = ROOT / "tools/bundle_three.py"
 VENDOR = ROOT / "dobot_async/panel/static/vendor"

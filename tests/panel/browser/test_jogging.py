@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
 from panel_stage import DESKTOP, PHONE, Stage, distance, until
 from playwright.async_api import expect
 
@@ -26,6 +27,7 @@ async def test_it_moves_while_a_button_is_held_and_stands_when_it_is_let_go(magi
     phone.check()
 
 
+@pytest.mark.full
 async def test_a_tab_that_is_closed_while_holding_stops_it(magician: Stage) -> None:
     phone = await magician.open(PHONE)
     await phone.take_control()
@@ -35,6 +37,7 @@ async def test_a_tab_that_is_closed_while_holding_stops_it(magician: Stage) -> N
     assert magician.panel.holder() is None
 
 
+@pytest.mark.full
 async def test_a_page_that_crashes_while_holding_stops_it(magician: Stage) -> None:
     phone = await magician.open(PHONE)
     await phone.take_control()
@@ -48,6 +51,7 @@ async def test_a_page_that_crashes_while_holding_stops_it(magician: Stage) -> No
     crash.exception()
 
 
+@pytest.mark.full
 async def test_a_page_that_hangs_while_holding_stops_it(magician: Stage) -> None:
     """No event of the page can end it, and its socket stays open: only that its beats do not come."""
     phone = await magician.open(PHONE)
@@ -58,6 +62,7 @@ async def test_a_page_that_hangs_while_holding_stops_it(magician: Stage) -> None
     assert magician.panel.holder()
 
 
+@pytest.mark.full
 async def test_a_network_that_is_cut_while_holding_stops_it(magician: Stage) -> None:
     phone = await magician.open(PHONE)
     await phone.take_control()
@@ -74,6 +79,7 @@ async def test_a_network_that_is_cut_while_holding_stops_it(magician: Stage) -> 
     assert magician.where() == stood
 
 
+@pytest.mark.full
 async def test_a_release_that_is_never_heard_does_not_keep_it_going(magician: Stage) -> None:
     """The finger is lifted where the page cannot see it: it does not capture the pointer any more, so no beats."""
     phone = await magician.open(PHONE)
@@ -85,6 +91,7 @@ async def test_a_release_that_is_never_heard_does_not_keep_it_going(magician: St
     await magician.stands()
 
 
+@pytest.mark.full
 async def test_a_window_that_loses_the_focus_while_holding_stops_it(magician: Stage) -> None:
     desktop = await magician.open(DESKTOP)
     await desktop.take_control()
@@ -93,6 +100,7 @@ async def test_a_window_that_loses_the_focus_while_holding_stops_it(magician: St
     await magician.stands()
 
 
+@pytest.mark.full
 async def test_a_key_that_is_held_moves_it(magician: Stage) -> None:
     desktop = await magician.open(DESKTOP)
     await desktop.take_control()
@@ -106,6 +114,7 @@ async def test_a_key_that_is_held_moves_it(magician: Stage) -> None:
     desktop.check()
 
 
+@pytest.mark.full
 async def test_a_key_that_stays_down_without_repeating_is_not_believed(magician: Stage) -> None:
     """A key that got stuck, or whose release went to another window."""
     desktop = await magician.open(DESKTOP)
@@ -117,6 +126,7 @@ async def test_a_key_that_stays_down_without_repeating_is_not_believed(magician:
     await desktop.page.keyboard.up("Space")
 
 
+@pytest.mark.full
 async def test_the_stop_is_in_reach_and_ends_what_is_held(magician: Stage) -> None:
     phone = await magician.open(PHONE)
     await phone.take_control()
@@ -134,6 +144,7 @@ async def test_the_stop_is_in_reach_and_ends_what_is_held(magician: Stage) -> No
     assert distance(magician.where(), stood) < 0.01
 
 
+@pytest.mark.full
 async def test_a_step_is_one_step(magician: Stage) -> None:
     phone = await magician.open(PHONE)
     await phone.take_control()
@@ -145,6 +156,7 @@ async def test_a_step_is_one_step(magician: Stage) -> None:
     assert abs(magician.where()[2] - before[2] - 10.0) < 0.1
 
 
+@pytest.mark.full
 async def test_joints_are_jogged_too(magician: Stage) -> None:
     desktop = await magician.open(DESKTOP)
     await desktop.take_control()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pytest
 from panel_stage import DESKTOP, PHONE, Stage, until
 from playwright.async_api import expect
 
 from dobot_async.arms.magician import commands as c
 
 pytest_plugins = ["panel_browser"]
+
+pytestmark = pytest.mark.full
 
 EVIL = "<!doctype html><title>another page</title>"
 TRIES = """() => new Promise(resolve => {

@@ -18,6 +18,8 @@ from playwright.async_api import Page, expect
 
 pytest_plugins = ["panel_browser"]
 
+pytestmark = pytest.mark.full
+
 AXE = "4.14.1"
 AXE_SHA512 = "FHfa+lmNjQZfJz1q8wKqIDwC6DExcHt/pkjNQb09a3NPjCKg2rhu5qb2S4r76ASyFNNtuFooJpZe37OgudVGtQ=="
 LARGEST_LOAD = 400_000

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 from contextlib import suppress
 
+import pytest
 from panel_stage import DESKTOP, PHONE, Stage, distance, until
 from playwright.async_api import expect
 
 from dobot_async.arms.magician import commands as c
 
 pytest_plugins = ["panel_browser"]
+
+pytestmark = pytest.mark.full
 
 LOGO = b"""<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="40mm" viewBox="0 0 40 40">
 <path d="M5 5 H35 V35 H5 Z M12 20 L20 28 L30 12" fill="none" stroke="black"/></svg>"""
