@@ -313,7 +313,7 @@ def test_a_dry_run_needs_no_arm_and_estimates(cross: str, arm: str) -> None:
     )
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_a_preview_is_saved_even_of_what_is_out_of_reach(cross: str, tmp_path: Path, kind: str) -> None:
     for at, code in ((AT, 0), (["--at", "300", "0", "-40"], 2)):

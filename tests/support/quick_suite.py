@@ -27,8 +27,8 @@ from typing import Any
 import hypothesis
 import pytest
 
-CASES = 4
-QUICK_EXAMPLES = 15
+CASES = 3
+QUICK_EXAMPLES = 12
 FEWEST_EXAMPLES = 5
 GOLDEN = 0.618  # steps of this part of the whole fall evenly, however many they are
 QUICK, FULL = "quick", "full"
