@@ -347,7 +347,7 @@ async def until_it_burns(sim: Simulation, seconds: float, process: Process) -> N
     await asyncio.sleep(seconds)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(3))
 async def test_ctrl_c_switches_the_laser_off_and_the_rest_is_burnt_once(seed: int) -> None:
     chance, picture, options = random.Random(seed), FILES / "shapes.png", ["--size", "24", "24", "--line", "2"]
