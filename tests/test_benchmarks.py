@@ -32,7 +32,7 @@ LINE = 0.0032  # seconds that a CP command and its acknowledgement take at 11520
 POINTS, STEP, SPEED = 600, 0.5, 100.0
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 @pytest.mark.parametrize("name", sorted(path.stem for path in BENCHMARKS.glob("bench_*.py")))
 def test_runs_and_reports(name: str) -> None:

@@ -562,6 +562,7 @@ def in_namespace(setup: str, program: str) -> list[str]:
     return ran.stdout.splitlines()
 
 
+@pytest.mark.full
 @linux
 def test_each_network_of_the_computer_is_asked() -> None:
     assert in_namespace(NETWORKS, TWO_ARMS) == [

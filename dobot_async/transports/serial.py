@@ -21,6 +21,9 @@ from dobot_async.transports.port import PortTransport
 __all__ = ["SerialTransport", "open_port"]
 
 SERIAL_ASYNCIO: Any = serial_asyncio  # it has no types
+if not hasattr(SERIAL_ASYNCIO, "connection_for_serial"):
+    raise ImportError("the serial_asyncio that is installed is not pyserial-asyncio")
+
 POSIX = os.name == "posix"
 
 

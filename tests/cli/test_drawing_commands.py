@@ -313,7 +313,7 @@ def test_a_dry_run_needs_no_arm_and_estimates(cross: str, arm: str) -> None:
     )
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_a_preview_is_saved_even_of_what_is_out_of_reach(cross: str, tmp_path: Path, kind: str) -> None:
     for at, code in ((AT, 0), (["--at", "300", "0", "-40"], 2)):
@@ -347,7 +347,7 @@ async def until_it_burns(sim: Simulation, seconds: float, process: Process) -> N
     await asyncio.sleep(seconds)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(3))
 async def test_ctrl_c_switches_the_laser_off_and_the_rest_is_burnt_once(seed: int) -> None:
     chance, picture, options = random.Random(seed), FILES / "shapes.png", ["--size", "24", "24", "--line", "2"]

@@ -317,6 +317,7 @@ async def test_a_session_with_all_keys(tmp_path: Path) -> None:
     assert (first.mode, first.suction, second.mode) == ("line", False, "line")
 
 
+@pytest.mark.full
 async def test_any_key_stops_what_is_played(sim: Simulation, tmp_path: Path) -> None:
     file = tmp_path / "part.json"
     save_recording(Recording("magician", steps=(TaughtStep((220, 100, 40, 0)), TaughtStep((220, -100, 40, 0)))), file)
@@ -535,7 +536,7 @@ async def test_a_playback_file_is_played_and_what_is_not_known_in_it_is_told(sim
     assert "item_13" in errors
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     "arguments",
     [

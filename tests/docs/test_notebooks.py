@@ -39,7 +39,7 @@ def test_each_notebook_is_known() -> None:
     assert {path.stem for path in NOTEBOOKS.glob("*.ipynb")} == set(WORDS)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("name", WORDS)
 def test_notebook(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {"__name__": "__main__"}

@@ -240,7 +240,7 @@ async def stopped_at(step: int, scenario: Scenario, fleet: Fleet[Any], sims: Map
     return True
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("latency", [0.002, *([0.0, 0.03] if ALL else [])])
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.__name__)
 def test_at_each_step(scenario: Scenario, latency: float) -> None:

@@ -481,6 +481,7 @@ Cell.TestCase.settings = settings(max_examples=examples(40), stateful_step_count
 test_any_cell = Cell.TestCase
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("first", range(0, 40, 10))
 def test_cells_that_go_on_for_long(first: int) -> None:
     for seed in range(first, first + 10):

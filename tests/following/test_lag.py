@@ -33,6 +33,7 @@ def test_a_magician_is_five_times_less_behind_than_with_each_target_queued(rows:
         assert 5 * rows[way]["lag_p95_ms"] < queued
 
 
+@pytest.mark.full
 def test_who_keeps_up_is_less_than_a_second_behind(rows: dict[str, dict[str, Any]]) -> None:
     for kind, row in rows.items():
         if "queued" not in kind and "ramps" not in kind.replace("no ramps", ""):

@@ -204,6 +204,7 @@ async def test_a_cobots_gripper_tells_whether_it_holds_something() -> None:
         assert {each.mode for each in down[1:3]} == {mycobot.MoveMode.LINEAR}
 
 
+@pytest.mark.full
 @virtual
 async def test_an_ultraarm_carries_a_part() -> None:
     scene = Scene(pieces=[Piece("red", (240, 0))], table=-60)

@@ -71,6 +71,7 @@ def measured(name: str, loss: float, latency: float, seed: int) -> Figures:
     return figures
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("latency", [0.0, 0.01], ids=["fast", "20 ms"])
 @pytest.mark.parametrize("name", FAMILIES)
 def test_reads_on_a_line_that_loses_one_message_in_twenty(name: str, latency: float) -> None:

@@ -274,6 +274,7 @@ async def test_a_plan_tells_what_could_not_be_done_and_shows_the_way(mode: str) 
         assert not r.sim.arm.executed
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     "steps",
     [

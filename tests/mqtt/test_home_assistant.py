@@ -35,7 +35,7 @@ SHARED = ("availability", "availability_mode", "state_topic", "qos", "device", "
 
 def told(family: str, *, moves: bool = True) -> dict[str, Any]:
     """What Home Assistant is told of an arm."""
-    on: Any = SimpleNamespace(name="left", manners=SimpleNamespace(title=family))
+    on: Any = SimpleNamespace(name="left", traits=SimpleNamespace(title=family))
     text = json.dumps(
         discovery_of(on, Topics("dobot", "left"), will_topic("dobot", "id"), joints=JOINTS[family], moves=moves)
     )

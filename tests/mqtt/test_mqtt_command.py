@@ -32,6 +32,7 @@ def ended() -> Iterator[None]:
             thread.join(1)
 
 
+@pytest.mark.full
 async def test_it_tells_a_broker_serves_metrics_and_stops_the_arm_when_it_is_ended() -> None:
     async with hall() as broker, ear(broker.port) as heard, simulate(listen=TCP, speed=1) as sim:
         options = ("--broker", f"mqtt://127.0.0.1:{broker.port}", "--name", "arm", "--allow-motion")

@@ -257,6 +257,7 @@ async def taken_up(b: Bench) -> str:
     return "the next motion that was queued is not executed"
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("first", range(0, SEEDS if EVERYTHING else QUICK, BLOCK))
 def test_the_arm_stands_once_the_line_is_back(first: int) -> None:
     faults = {}

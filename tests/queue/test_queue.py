@@ -346,6 +346,24 @@ async def test_the_queue_is_emptied_behind_what_was_still_being_sent() -> None:
         await asyncio.gather(call, return_exceptions=True)
 
 
+async def test_a_stop_ends_what_sets_the_arm_in_motion_beside_the_queue() -> None:
+    executor = FakeExecutor()
+    sent: list[float] = []
+
+    async def jog() -> None:
+        await asyncio.sleep(1)
+        sent.append(now())
+
+    async with queue_over(executor) as queue:
+        call = start(queue.beside(jog()))
+        await asyncio.sleep(0.1)
+        await queue.stop()
+        await asyncio.sleep(FAR_TOO_LONG)
+        assert not sent
+        with pytest.raises(MotionStopped):
+            await call
+
+
 async def test_clear_empties_the_queue_and_does_not_halt() -> None:
     executor = FakeExecutor()
     async with queue_over(executor) as queue:

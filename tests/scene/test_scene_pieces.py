@@ -82,6 +82,7 @@ async def test_a_piece_turns_with_the_tool() -> None:
     assert place(scene.pieces["red"]) == (260, 0, -138)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("x", "z", "suck"),
     [
@@ -167,6 +168,7 @@ async def test_a_gripper_takes_what_is_between_its_fingers_when_they_close() -> 
     assert place(scene.pieces["red"]) == (200, 59, -138)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("piece", "y", "first"),
     [

@@ -40,7 +40,7 @@ HARD_CELLS = {
 """The same of the scenarios of several arms."""
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(2)
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
 @pytest.mark.parametrize("first", range(0, SEEDS, BLOCK))
 def test_seeds(first: int) -> None:

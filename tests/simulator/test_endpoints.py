@@ -414,6 +414,7 @@ async def test_a_serial_client_that_does_not_read_loses_replies_and_nobody_waits
         await ask_again(transport)
 
 
+@pytest.mark.full
 @virtual
 async def test_a_client_in_memory_that_does_not_read_loses_replies_and_nobody_else_does() -> None:
     async with simulate() as sim, client(sim.url) as deaf, client(sim.url) as other:

@@ -17,17 +17,18 @@ The choice depends on names and parameters alone: it is the same in every proces
 
 from __future__ import annotations
 
+import gc
 import os
 import zlib
 from collections import defaultdict
-from collections.abc import Hashable, Sequence
+from collections.abc import Generator, Hashable, Sequence
 from typing import Any
 
 import hypothesis
 import pytest
 
-CASES = 4
-QUICK_EXAMPLES = 15
+CASES = 3
+QUICK_EXAMPLES = 12
 FEWEST_EXAMPLES = 5
 GOLDEN = 0.618  # steps of this part of the whole fall evenly, however many they are
 QUICK, FULL = "quick", "full"
@@ -66,6 +67,17 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[LEFT] = (0, 0)
     everything = config.getoption("full") or config.getoption("rest")
     hypothesis.settings.load_profile(FULL if everything else QUICK)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Collects without the garbage collector, and lets it look at what was collected never: a tenth of all the time."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.hookimpl(trylast=True)

@@ -85,7 +85,7 @@ with Magician.connect(url) as arm:
 """
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("body", [BLOCKED, SLEEPING], ids=["in a call", "between calls"])
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 async def test_a_signal_stops_the_arm_and_ends_the_program(name: str, body: str) -> None:

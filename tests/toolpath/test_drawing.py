@@ -407,6 +407,7 @@ def test_what_nobody_can_estimate_is_refused() -> None:
     assert estimate(Toolpath(), PAPER).seconds == 0
 
 
+@pytest.mark.full
 @virtual
 async def test_an_ultraarm_draws() -> None:
     plane = WorkPlane.flat(180, -40, 20)

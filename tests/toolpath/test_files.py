@@ -13,7 +13,6 @@ from itertools import pairwise
 import ezdxf
 import numpy as np
 import pytest
-import svgpathtools
 from ezdxf import disassemble
 from geometry import FILES, Line, apart, lines_of
 from hypothesis import given, settings
@@ -55,6 +54,8 @@ def wrong(read: Callable[[], Toolpath]) -> ToolpathFileError | None:
 
 def by_svgpathtools(name: str, scale: float, height: float, start: tuple[float, float] = (0, 0)) -> list[Line]:
     """What svgpathtools reads, which knows groups and transforms; of the viewBox it is told scale and height in mm."""
+    import svgpathtools  # SciPy comes with it, and takes half a second
+
     found: list[Line] = []
     for path in svgpathtools.Document(str(FILES / name)).paths():
         for part in path.continuous_subpaths():
@@ -123,6 +124,8 @@ def test_curves_are_missed_by_no_more_than_the_tolerance(controls: Sequence[comp
     data = "M{} {}C{} {} {} {} {} {}".format(*(f"{n:.4f}" for c in controls for n in (c.real, c.imag)))
     page = 'width="100mm" height="100mm" viewBox="0 0 100 100"'
     text = f'<svg xmlns="http://www.w3.org/2000/svg" {page}><path d="{data}"/></svg>'
+    import svgpathtools
+
     curve = svgpathtools.parse_path(data)[0]
     fine: list[Line] = [[((p := curve.point(i / 500)).real, 100 - p.imag) for i in range(501)]]
     assert apart(fine, lines_of(read_svg(io.StringIO(text), tolerance=tolerance)), step=1.0) <= tolerance + 0.02

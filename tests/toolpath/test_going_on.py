@@ -236,7 +236,7 @@ async def test_where_to_begin_is_checked() -> None:
         assert burner.length == pytest.approx(10, abs=0.01)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(3))
 def test_an_ultraarm_leaves_nothing_out_and_its_laser_is_off(seed: int) -> None:
     plane, chance = WorkPlane.flat(180, -40, 20), random.Random(seed)

@@ -168,6 +168,7 @@ def test_a_homography_is_found_from_four_pairs_and_more(seed: int, count: int) -
         assert found.to_pixel(*table(*pixel)) == pytest.approx(pixel, abs=1e-3)
 
 
+@pytest.mark.full
 @settings(deadline=None, max_examples=examples(40))
 @given(st.integers(0, 10_000), st.integers(8, 20))
 def test_outliers_are_found_and_told_in_spite_of_noise(seed: int, count: int) -> None:

@@ -98,7 +98,7 @@ async def test_a_spoilt_request_is_sent_again_even_if_it_ends_nowhere(lines: lis
         assert targets(sim) == [220]
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("late", [0.05, 0.3, 1.5, 2.5])
 @virtual
 async def test_a_late_reply_never_answers_a_later_call(lines: list[BadLine], late: float) -> None:

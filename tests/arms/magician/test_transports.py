@@ -388,6 +388,7 @@ async def test_a_tcp_peer_that_never_stops_sending(kind: str) -> None:
         await refused(url, NOT_AN_ARM if kind != "frames" else "3D-printing")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("kind", FLOODS)
 async def test_a_serial_peer_that_never_stops_sending(kind: str) -> None:
     with pseudo_terminal() as (master, path), babbling(master, FLOODS[kind]):
@@ -411,6 +412,7 @@ def babbling(descriptor: int, data: bytes) -> Iterator[None]:
         loop.remove_writer(descriptor)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("kind", FLOODS)
 async def test_a_udp_peer_that_never_stops_sending(kind: str) -> None:
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as peer:

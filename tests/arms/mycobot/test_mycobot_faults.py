@@ -185,6 +185,7 @@ def test_a_reply_in_pieces_and_among_noise_is_the_same(cuts: list[int], noise: l
     run_virtual(compare())
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     "quirks", [MyCobotQuirks(), MyCobotQuirks(acknowledges=False, later=False)], ids=["new", "old"]
 )

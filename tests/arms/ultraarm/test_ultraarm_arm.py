@@ -60,6 +60,7 @@ def at(coords: UltraArmCoords, x: float, y: float, z: float) -> bool:
     return math.dist((coords.x, coords.y, coords.z), (x, y, z)) < 0.011
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("quirks", FIRMWARES, ids=str)
 @virtual
 async def test_an_await_returns_when_the_arm_has_arrived(quirks: UltraArmQuirks) -> None:
@@ -82,6 +83,7 @@ async def test_an_await_returns_when_the_arm_has_arrived(quirks: UltraArmQuirks)
         assert sim.arm.device.now >= started + 2
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("count_executing", [False, True])
 @pytest.mark.parametrize("quirks", FIRMWARES, ids=str)
 @virtual
