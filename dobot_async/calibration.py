@@ -103,13 +103,25 @@ class Calibration:
     def to_arm(self, pixel: Sequence[SupportsFloat]) -> Pair:
         """Return the arm's x and y in mm of a pixel (u, v).
 
+        Args:
+            pixel: u to the right and v down, as the image has them; fractions count.
+
         Raises:
             ValueError: The pixel is on the camera's horizon, or beyond it.
         """
         return mapped(self.matrix, pair(pixel, "a pixel"))
 
     def to_pixel(self, x: SupportsFloat, y: SupportsFloat) -> Pair:
-        """Return the pixel of a place of the arm, mm."""
+        """Return the pixel of a place of the arm, mm.
+
+        Args:
+            x: mm.
+            y: mm.
+
+        Raises:
+            ValueError: It is no place that the camera can see.
+            TypeError: It is not given by numbers.
+        """
         return mapped(inverse(self.matrix), pair((x, y), "a place"))
 
     def to_json(self) -> str:
@@ -132,12 +144,24 @@ class Calibration:
         return cls(cast(Rows, numbers), residuals, used)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write it to a JSON file."""
+        """Write it to a JSON file.
+
+        Args:
+            path: Of the file, which is replaced if it is there.
+
+        Raises:
+            OSError: It cannot be written.
+        """
         Path(path).write_text(self.to_json() + "\n", encoding="utf-8")
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
-        """Return what `save` has written; raise ValueError, with the file's name, for anything else."""
+        """Return what `save` has written; raise ValueError, with the file's name, for anything else.
+
+        Raises:
+            ValueError: It is no calibration.
+            OSError: It cannot be read.
+        """
         try:
             return cls.from_json(Path(path).read_text(encoding="utf-8"))
         except ValueError as error:

@@ -45,7 +45,7 @@ class DobotError(Exception):
             which; () for everything else.
     """
 
-    steps: tuple[Any, ...] = ()
+    steps: tuple[object, ...] = ()
 
 
 class ConnectFailed(DobotError, ConnectionError):
@@ -75,7 +75,7 @@ class ArmAlarm(DobotError):
         alarms: What is set: of a Magician and a myCobot each with its code, name, cause and remedy; of an ultraArm,
             which has no alarms of its own, what was seen, in words when printed.
         motions: Of a queue, in order: the first motion that is not known to be done, up to the last that may have
-            failed; while the arm follows, the target.
+            failed, each a `Motion`; while the arm follows, words that name the target.
     """
 
     def __init__(self, message: str, alarms: Sequence[Any] = (), motions: Sequence[object] = ()) -> None:

@@ -30,7 +30,7 @@ from dobot_async.errors import ConnectFailed
 from dobot_async.transports.zenoh.config import ZenohConfig, address, library
 from dobot_async.transports.zenoh.messages import DATA, END, Lost, Numbered, SendQueue
 from dobot_async.transports.zenoh.session import VERSION, KeyExpressions, ZenohSession
-from dobot_async.transports.zenoh.typed import answering
+from dobot_async.transports.zenoh.typed import LivelinessToken, answering, declared
 
 if TYPE_CHECKING:
     import zenoh
@@ -98,7 +98,7 @@ class ZenohListener:
         self._connections: dict[str, ZenohConnection] = {}
         self._leaving: set[asyncio.Task[None]] = set()
         self._told = Allowance(UNAUTHENTICATED, asyncio.get_running_loop().time)
-        self._token: zenoh.LivelinessToken | None = None
+        self._token: LivelinessToken | None = None
 
     async def open(self) -> None:
         """Opens the session, listens for clients, and then lets everybody know of the arm.
@@ -113,14 +113,14 @@ class ZenohListener:
 
         # Another one may have looked at the same time. Who comes behind sees both now; where both do, one gives way.
         key = f"{self.keys.arm}/{self.bridge.family.model}/{self.session.id}"
-        self._token = self.session.raw.liveliness().declare_token(key)
+        self._token = declared(self.session.raw.liveliness().declare_token(key))
         others = await self._others()
         if others and self.session.id < min(others):
             await asyncio.sleep(GIVES_WAY)
             others = await self._others()
 
         if others:
-            self._token.undeclare()  # type: ignore[no-untyped-call]
+            self._token.undeclare()
             raise ConnectFailed(self._taken())
 
     async def aclose(self) -> None:

@@ -136,7 +136,16 @@ class Fleet(Programs[A]):
         return name in self._fleet_arms
 
     def arm(self, name: str, kind: type[K]) -> K:
-        """Returns an arm of a family, typed; raises TypeError if it is of another."""
+        """Returns an arm of a family, typed; raises TypeError if it is of another.
+
+        Args:
+            name: Of the arm.
+            kind: Its class: Magician, MyCobot or UltraArm.
+
+        Raises:
+            KeyError: There is no such arm.
+            TypeError: It is of another family.
+        """
         arm = self._fleet_arm(name).arm
         if not isinstance(arm, kind):
             raise TypeError(f"{name} is a {self._fleet_arm(name).member.kind.__name__}, not a {kind.__name__}")
@@ -144,7 +153,7 @@ class Fleet(Programs[A]):
         return arm
 
     def member(self, name: str) -> Member[A]:
-        """Returns what the fleet was told of an arm before it was connected."""
+        """Returns what the fleet was told of an arm before it was connected; raises KeyError if there is none."""
         return self._fleet_arm(name).member
 
     @property
@@ -153,7 +162,7 @@ class Fleet(Programs[A]):
         return dict(self._zones.shapes)
 
     def base(self, name: str) -> BaseFrame:
-        """Returns where an arm stands in the cell."""
+        """Returns where an arm stands in the cell; raises KeyError if there is no such arm."""
         return self._fleet_arm(name).member.base
 
     def to_cell(self, name: str, x: float, y: float, z: float, r: float = 0.0) -> Place:
@@ -165,6 +174,9 @@ class Fleet(Programs[A]):
             y: mm.
             z: mm.
             r: Degrees.
+
+        Raises:
+            KeyError: There is no such arm.
         """
         return self.base(name).to_cell(x, y, z, r)
 
@@ -177,6 +189,9 @@ class Fleet(Programs[A]):
             y: mm.
             z: mm.
             r: Degrees.
+
+        Raises:
+            KeyError: There is no such arm.
         """
         return self.base(name).to_arm(x, y, z, r)
 

@@ -39,12 +39,26 @@ class BaseFrame:
             raise ValueError(f"a base frame has finite numbers, not {self}")
 
     def to_cell(self, x: float, y: float, z: float, r: float = 0.0) -> Place:
-        """Returns where a place of the arm is in the cell."""
+        """Returns where a place of the arm is in the cell.
+
+        Args:
+            x: mm, as the arm counts.
+            y: mm.
+            z: mm.
+            r: Degrees.
+        """
         cos, sin = self._turn()
         return Place(self.x + x * cos - y * sin, self.y + x * sin + y * cos, self.z + z, r + self.yaw)
 
     def to_arm(self, x: float, y: float, z: float, r: float = 0.0) -> Place:
-        """Returns where a place of the cell is for the arm."""
+        """Returns where a place of the cell is for the arm.
+
+        Args:
+            x: mm, as the cell counts.
+            y: mm.
+            z: mm.
+            r: Degrees.
+        """
         cos, sin = self._turn()
         ahead, aside = x - self.x, y - self.y
         return Place(ahead * cos + aside * sin, aside * cos - ahead * sin, z - self.z, r - self.yaw)

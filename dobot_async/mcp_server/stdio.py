@@ -14,6 +14,7 @@ import os
 import threading
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from queue import SimpleQueue
 
 import anyio
@@ -109,11 +110,17 @@ class LineWriter:
                 self._tell(self._broken)
                 return
 
-            self._tell(lambda done=written: done.cancelled() or done.set_result(None))  # type: ignore[misc]
+            self._tell(partial(settle, written))
 
     def _tell(self, what: Callable[[], object]) -> None:
         with suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(what)
+
+
+def settle(done: asyncio.Future[None]) -> None:
+    """Let who waits go on, if anybody still does."""
+    if not done.done():
+        done.set_result(None)
 
 
 @asynccontextmanager

@@ -114,7 +114,7 @@ class PanelConnection(asyncio.Protocol):
     """
 
     def __init__(self, pending: PendingConnections) -> None:
-        self.address = "?"
+        self.address: str = "?"
         self.handler: RequestHandler | None = None
         self._pending = pending
         self._early = bytearray()

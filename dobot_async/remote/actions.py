@@ -94,7 +94,8 @@ def parse_action(given: Mapping[str, Any]) -> Action:
 
     hints = hints_of(kind)
     values = {key: to_field(f"{name}: {key}", value, hints[key]) for key, value in given.items()}
-    return cast(Any, kind)(**values)  # type: ignore[no-any-return]
+    make: Callable[..., Action] = kind
+    return make(**values)
 
 
 @cache

@@ -74,7 +74,11 @@ async def state_told(on: RemoteArm, doing: str | None = None) -> dict[str, Any]:
 
 
 def reach_told(on: RemoteArm) -> dict[str, Any]:
-    """Return where the tool of an arm may go: by heights, how near and how far straight in front of the arm."""
+    """Return where the tool of an arm may go: by heights, how near and how far straight in front of the arm.
+
+    Args:
+        on: The arm, with the bounds that it has here.
+    """
     return {
         "arm": on.name,
         "family": on.traits.title,
@@ -95,7 +99,11 @@ def reach_at(on: RemoteArm, z: float) -> Iterator[dict[str, float]]:
 
 
 def scene_told(site: Site) -> dict[str, Any]:
-    """Return which arms there are, where they stand, what they share, and what may be done with them."""
+    """Return which arms there are, where they stand, what they share, and what may be done with them.
+
+    Args:
+        site: All arms that there are, and what they share.
+    """
     return {
         "motion": "allowed" if site.moves else "not allowed: only reading and planning",
         "arms": {

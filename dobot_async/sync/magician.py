@@ -43,7 +43,16 @@ class Batch(BatchTwin[AsyncBatch], Verbs[Motion]):
     """Commands that are sent together; each verb returns its Motion, to be waited for after the batch's block."""
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
-        """Add any row of the table that may be queued."""
+        """Add any row of the table that may be queued.
+
+        Args:
+            command: A row of the table that may be queued.
+            value: Its parameters.
+
+        Raises:
+            ValueError: The parameters do not fit, or the command cannot be queued.
+            TypeError: They are of the wrong type.
+        """
         return Motion(PORTAL.look(lambda: self.asynchronous.put(command, value)))
 
 
@@ -51,7 +60,16 @@ class Download(BatchTwin[AsyncDownload], Verbs[Motion]):
     """Commands to be stored in the arm; nobody waits for their Motions."""
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
-        """Add any row of the table that may be queued."""
+        """Add any row of the table that may be queued.
+
+        Args:
+            command: A row of the table that may be queued.
+            value: Its parameters.
+
+        Raises:
+            ValueError: The parameters do not fit, or the command cannot be queued.
+            TypeError: They are of the wrong type.
+        """
         return Motion(PORTAL.look(lambda: self.asynchronous.put(command, value)))
 
 
@@ -140,15 +158,35 @@ class MagicianQueue(QueueTwin[AsyncMagicianQueue], Verbs[Motion]):
         PORTAL.run(lambda: self.asynchronous.join(timeout))
 
     def pause(self) -> None:
-        """Let the arm finish the command that it executes, and then wait; Motions stay pending."""
+        """Let the arm finish the command that it executes, and then wait; Motions stay pending.
+
+        Raises:
+            ReplyTimeout: The arm does not acknowledge it.
+            ConnectionLost: The link is gone.
+        """
         PORTAL.run(self.asynchronous.pause)
 
     def resume(self) -> None:
-        """Let a paused arm go on; a stop ends this call, which raises why: MotionStopped, or the ArmAlarm behind it."""
+        """Let a paused arm go on; a stop ends this call, which raises why: MotionStopped, or the ArmAlarm behind it.
+
+        Raises:
+            MotionStopped: A stop ended this call.
+            ArmAlarm: An alarm was behind that stop.
+            ReplyTimeout: The arm does not acknowledge it.
+            ConnectionLost: The link is gone.
+        """
         PORTAL.run(self.asynchronous.resume)
 
     def clear(self, *, timeout: float = 5.0) -> None:
-        """Throw away all that is queued, the running command included; its Motions raise MotionStopped. See `stop`."""
+        """Throw away all that is queued, the running command included; its Motions raise MotionStopped. See `stop`.
+
+        Args:
+            timeout: Seconds to wait until the arm has acknowledged it.
+
+        Raises:
+            ReplyTimeout: The arm has not acknowledged it yet.
+            ConnectionLost: The link is gone.
+        """
         PORTAL.run(lambda: self.asynchronous.clear(timeout=timeout))
 
     @property
@@ -206,7 +244,12 @@ class WiFi(Twin[AsyncWiFi]):
         )
 
     def connected(self, *, timeout: float | None = None) -> bool:
-        """Returns whether the arm is in its network. Manual 2.18.8."""
+        """Returns whether the arm is in its network. Manual 2.18.8.
+
+        Raises:
+            ReplyTimeout: No answer came.
+            ConnectionLost: The link is gone.
+        """
         return PORTAL.run(lambda: self.asynchronous.connected(timeout=timeout))
 
     def wait_connected(self, timeout: float = 30.0) -> None:
@@ -223,7 +266,7 @@ class WiFi(Twin[AsyncWiFi]):
 
 
 class Magician(ArmTwin[AsyncMagician], Verbs[None]):
-    """A Dobot Magician; made by `connect`. Each verb returns when the arm has done it.
+    """A Dobot Magician; made by `connect`. Each verb returns when the arm has done it, and raises what `Arm` names.
 
     A motion belongs to the call that waits for it: if that is cancelled, or its timeout passes, the arm stops.
     """
@@ -560,6 +603,10 @@ class Magician(ArmTwin[AsyncMagician], Verbs[None]):
 
         Args:
             mode: A pose when the key is released, or at intervals while it is held. Manual 2.7.
+
+        Raises:
+            ReplyTimeout: The arm does not answer in time.
+            ConnectionLost: The link is gone.
         """
         return Items(lambda: self.asynchronous.taught_points(mode), same)
 

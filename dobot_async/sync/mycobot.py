@@ -47,7 +47,16 @@ class CobotBatch(BatchTwin[AsyncCobotBatch], Verbs[Motion]):
         return self.asynchronous.model
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
-        """Add any row of the table that may be queued."""
+        """Add any row of the table that may be queued.
+
+        Args:
+            command: A row of the table that may be queued.
+            value: Its parameters.
+
+        Raises:
+            ValueError: The parameters do not fit, or the command cannot be queued.
+            TypeError: They are of the wrong type.
+        """
         return Motion(PORTAL.look(lambda: self.asynchronous.put(command, value)))
 
 
@@ -112,11 +121,23 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
         PORTAL.run(lambda: self.asynchronous.join(timeout))
 
     def pause(self) -> None:
-        """Let the arm finish the command that it executes, and then wait; Motions stay pending."""
+        """Let the arm finish the command that it executes, and then wait; Motions stay pending.
+
+        Raises:
+            ReplyTimeout: The arm does not acknowledge it.
+            ConnectionLost: The link is gone.
+        """
         PORTAL.run(self.asynchronous.pause)
 
     def resume(self) -> None:
-        """Let a paused arm go on; a stop ends this call, which raises why: MotionStopped, or the ArmAlarm behind it."""
+        """Let a paused arm go on; a stop ends this call, which raises why: MotionStopped, or the ArmAlarm behind it.
+
+        Raises:
+            MotionStopped: A stop ended this call.
+            ArmAlarm: An alarm was behind that stop.
+            ReplyTimeout: The arm does not acknowledge it.
+            ConnectionLost: The link is gone.
+        """
         PORTAL.run(self.asynchronous.resume)
 
     def stop(self, *, timeout: float = 5.0) -> None:
@@ -133,7 +154,15 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
         PORTAL.run(lambda: self.asynchronous.stop(timeout=timeout))
 
     def clear(self, *, timeout: float = 5.0) -> None:
-        """Throw away all that is queued, the running command included; its Motions raise MotionStopped. See `stop`."""
+        """Throw away all that is queued, the running command included; its Motions raise MotionStopped. See `stop`.
+
+        Args:
+            timeout: Seconds to wait until the arm has acknowledged it.
+
+        Raises:
+            ReplyTimeout: The arm has not acknowledged it yet.
+            ConnectionLost: The link is gone.
+        """
         PORTAL.run(lambda: self.asynchronous.clear(timeout=timeout))
 
     @property
@@ -143,7 +172,7 @@ class CobotQueue(QueueTwin[AsyncCobotQueue], Verbs[Motion]):
 
 
 class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
-    """An arm behind a link; made by `connect`. Each verb returns when the arm has done it.
+    """An arm behind a link; made by `connect`. Each verb returns when it is done, and raises what `Arm` names.
 
     A motion belongs to the call that waits for it: if that is cancelled, or its timeout passes, the arm stops.
     """
@@ -393,7 +422,12 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         return PORTAL.run(lambda: self.asynchronous.get_pin(pin, base=base, timeout=timeout))
 
     def get_gripper(self, *, kind: c.GripperType | None = None, timeout: float | None = None) -> int:
-        """Return how far the gripper is open, 0 to 100 percent; raise CommandRejected if no gripper answers the arm."""
+        """Return how far the gripper is open, 0 to 100 percent; raise CommandRejected if no gripper answers the arm.
+
+        Args:
+            kind: Which gripper it is, where the firmware has to be told.
+            timeout: Seconds.
+        """
         return PORTAL.run(lambda: self.asynchronous.get_gripper(kind=kind, timeout=timeout))
 
     def get_encoders(self, *, timeout: float | None = None) -> tuple[int, ...]:
@@ -472,15 +506,30 @@ class MyCobot(ArmTwin[AsyncMyCobot], Verbs[None]):
         PORTAL.run(lambda: self.asynchronous.set_world(*coords, timeout=timeout))
 
     def set_reference_frame(self, frame: c.ReferenceFrame, *, timeout: float | None = None) -> None:
-        """Say in which frame coordinates are."""
+        """Say in which frame coordinates are.
+
+        Args:
+            frame: That of the arm's base, or the world's; see `set_world`.
+            timeout: Seconds.
+        """
         PORTAL.run(lambda: self.asynchronous.set_reference_frame(frame, timeout=timeout))
 
     def set_end_type(self, end: c.EndType, *, timeout: float | None = None) -> None:
-        """Say whether coordinates are the flange's or the tool's."""
+        """Say whether coordinates are the flange's or the tool's.
+
+        Args:
+            end: The flange, or the tool; see `set_tool`.
+            timeout: Seconds.
+        """
         PORTAL.run(lambda: self.asynchronous.set_end_type(end, timeout=timeout))
 
     def set_movement_type(self, mode: c.MoveMode, *, timeout: float | None = None) -> None:
-        """Say how the arm moves to a point where the motion does not say it."""
+        """Say how the arm moves to a point where the motion does not say it.
+
+        Args:
+            mode: ANGULAR moves the joints, LINEAR the tool along a straight line.
+            timeout: Seconds.
+        """
         PORTAL.run(lambda: self.asynchronous.set_movement_type(mode, timeout=timeout))
 
     def jog(self, direction: str, seconds: float, *, speed: int = 50) -> None:

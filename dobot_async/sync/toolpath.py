@@ -134,6 +134,11 @@ def draw(arm: AnyArm, toolpath: Toolpath, plane: WorkPlane, *, first: int = 0, *
         plane: Where the paper lies.
         first: The stroke, from 0, to begin with.
         options: As for `Drawing`: speed, tolerance, acceleration, percent, rate, progress.
+
+    Raises:
+        ValueError: An option is out of range.
+        UnreachableStroke: A stroke is out of the arm's reach; nothing has moved.
+        DobotError: The arm failed, and was stopped; a note tells the stroke.
     """
     PORTAL.run(lambda: async_draw(arm_of(arm), toolpath, plane, first=first, **options))
 
@@ -145,6 +150,20 @@ def engrave(
 
     The plane is that of the focus: the laser is moved in it, and lifted on the way to the first stroke alone. A dot is
     a line of 0.1 mm. With `first` and `point` it goes on where it was stopped.
+
+    Args:
+        arm: A connected Magician or UltraArm.
+        toolpath: What to engrave.
+        plane: Where the laser has its focus.
+        first: The stroke, from 0, to begin with.
+        point: How far in this stroke; see `Drawing.next_point`.
+        options: As for `Drawing`: speed, tolerance, acceleration, percent, rate, progress.
+
+    Raises:
+        ValueError: An option is out of range.
+        UnsupportedError: The arm has no laser.
+        UnreachableStroke: A stroke is out of the arm's reach; nothing has moved.
+        DobotError: The arm failed, and was stopped; a note tells the stroke.
     """
     PORTAL.run(lambda: async_engrave(arm_of(arm), toolpath, plane, first=first, point=point, **options))
 

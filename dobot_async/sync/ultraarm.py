@@ -45,7 +45,16 @@ class UltraArmBatch(BatchTwin[AsyncUltraArmBatch], Verbs[Motion]):
         self.pump: Pump = asynchronous.pump
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
-        """Add any row of the table that may be queued."""
+        """Add any row of the table that may be queued.
+
+        Args:
+            command: A row of the table that may be queued.
+            value: Its parameters.
+
+        Raises:
+            ValueError: The parameters do not fit, or the command cannot be queued.
+            TypeError: They are of the wrong type.
+        """
         return Motion(PORTAL.look(lambda: self.asynchronous.put(command, value)))
 
 
@@ -109,11 +118,23 @@ class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
         PORTAL.run(lambda: self.asynchronous.join(timeout))
 
     def pause(self) -> None:
-        """Let the arm finish the command that it executes, and then wait; Motions stay pending."""
+        """Let the arm finish the command that it executes, and then wait; Motions stay pending.
+
+        Raises:
+            ReplyTimeout: The arm does not acknowledge it.
+            ConnectionLost: The link is gone.
+        """
         PORTAL.run(self.asynchronous.pause)
 
     def resume(self) -> None:
-        """Let a paused arm go on; a stop ends this call, which raises why: MotionStopped, or the ArmAlarm behind it."""
+        """Let a paused arm go on; a stop ends this call, which raises why: MotionStopped, or the ArmAlarm behind it.
+
+        Raises:
+            MotionStopped: A stop ended this call.
+            ArmAlarm: An alarm was behind that stop.
+            ReplyTimeout: The arm does not acknowledge it.
+            ConnectionLost: The link is gone.
+        """
         PORTAL.run(self.asynchronous.resume)
 
     def stop(self, *, timeout: float = 5.0) -> None:
@@ -130,7 +151,15 @@ class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
         PORTAL.run(lambda: self.asynchronous.stop(timeout=timeout))
 
     def clear(self, *, timeout: float = 5.0) -> None:
-        """Throw away all that is queued, the running command included; its Motions raise MotionStopped. See `stop`."""
+        """Throw away all that is queued, the running command included; its Motions raise MotionStopped. See `stop`.
+
+        Args:
+            timeout: Seconds to wait until the arm has acknowledged it.
+
+        Raises:
+            ReplyTimeout: The arm has not acknowledged it yet.
+            ConnectionLost: The link is gone.
+        """
         PORTAL.run(lambda: self.asynchronous.clear(timeout=timeout))
 
     @property
@@ -140,7 +169,7 @@ class UltraArmQueue(QueueTwin[AsyncUltraArmQueue], Verbs[Motion]):
 
 
 class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
-    """An ultraArm P340; made by `connect`. Each verb returns when the arm has done it.
+    """An ultraArm P340; made by `connect`. Each verb returns when the arm has done it, and raises what `Arm` names.
 
     A command belongs to the call that waits for it: if that is cancelled, or its timeout passes, the arm stops.
     """
@@ -413,6 +442,10 @@ class UltraArm(ArmTwin[AsyncUltraArm], Verbs[None]):
 
         Args:
             timeout: Seconds to wait until the arm is seen to stand; it is told again after that, too, until it does.
+
+        Raises:
+            ReplyTimeout: The arm is not seen to stand yet.
+            ConnectionLost: The link is gone.
         """
         PORTAL.run(lambda: self.asynchronous.jog_stop(timeout=timeout))
 

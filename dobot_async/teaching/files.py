@@ -30,7 +30,11 @@ LISTS: Mapping[str, type[TaughtStep | PathSample]] = {"steps": TaughtStep, "path
 
 
 def to_json(recording: Recording) -> str:
-    """Return the text of a file."""
+    """Return the text of a file.
+
+    Args:
+        recording: What to write.
+    """
     head = {"format": FORMAT, "version": VERSION, **given(recording, without={*LISTS, "remarks"})}
     lines = [json.dumps(head, ensure_ascii=False)[:-1]]
     for name in LISTS:
@@ -123,6 +127,9 @@ def made(kind: type[Any], read: object, name: str, place: str) -> Any:
 def load_recording(file: str | Path) -> Recording:
     """Read a recording: JSON, or a file of DobotStudio if its name ends with `.playback`.
 
+    Args:
+        file: Its path.
+
     Raises:
         RecordingFileError: Something in it is wrong.
         OSError: It cannot be read.
@@ -141,6 +148,10 @@ def load_recording(file: str | Path) -> Recording:
 
 def save_recording(recording: Recording, file: str | Path) -> None:
     """Write a recording: as JSON, or for DobotStudio if the file's name ends with `.playback`.
+
+    Args:
+        recording: What to write.
+        file: Its path; an older file stays until the new one is whole.
 
     Raises:
         ValueError: A `.playback` file cannot hold it; see `write_playback`.

@@ -197,6 +197,9 @@ def write_playback(recording: Recording) -> str:
 
     The joints are not in it, nor is the tool's offset. A tool that has been switched once is in every row from there.
 
+    Args:
+        recording: Steps of a Magician.
+
     Raises:
         RecordingUnfit: It is no Magician's, or a path; or a step goes to joints, opens the gripper partly, or there are
             both suction and gripper.

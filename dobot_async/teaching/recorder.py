@@ -31,6 +31,9 @@ def released(arm: Arm) -> AbstractAsyncContextManager[None]:
 
     A myCobot holds again at the end, however the block ends. An ultraArm gets its power back, and has to be homed.
 
+    Args:
+        arm: A connected MyCobot or UltraArm.
+
     Raises:
         CommandRejected: Motions are under way; or, of an ultraArm at the end: it has not noticed where it was led.
         UnsupportedError: It is a Magician, which has a key for that; see `Recorder.from_key`.
@@ -100,15 +103,39 @@ class Recorder:
         return self._take(TaughtStep(pose, joints, mode or self._taught.mode, tuple(via), pause=pause, name=name))
 
     async def suction(self, on: bool) -> None:
-        """Switch the cup, and take that down: in the last step if the arm stands there, else as a step of its own."""
+        """Switch the cup, and take that down: in the last step if the arm stands there, else as a step of its own.
+
+        Args:
+            on: Whether to suck.
+
+        Raises:
+            ValueError: There is a path in the recording.
+            DobotError: The arm did not tell where it is, or did not switch it.
+        """
         await self._switch("suction", bool(on))
 
     async def gripper(self, closed: bool) -> None:
-        """Close or open the gripper, and take that down, as `suction` does."""
+        """Close or open the gripper, and take that down, as `suction` does.
+
+        Args:
+            closed: Whether to close it.
+
+        Raises:
+            ValueError: There is a path in the recording.
+            DobotError: The arm did not tell where it is, or did not move it.
+        """
         await self._switch("gripper", 0.0 if closed else 100.0)
 
     async def gripper_to(self, percent: SupportsFloat) -> None:
-        """Open the gripper to 0 (closed) to 100 percent, and take that down, as `suction` does."""
+        """Open the gripper to 0 (closed) to 100 percent, and take that down, as `suction` does.
+
+        Args:
+            percent: 0 to 100; of a Magician 0 or 100.
+
+        Raises:
+            ValueError: It is out of range, or there is a path in the recording.
+            DobotError: The arm did not tell where it is, or did not move it.
+        """
         await self._switch("gripper", to_float(percent, "percent"))
 
     def change_last(self, **changes: Any) -> TaughtStep:

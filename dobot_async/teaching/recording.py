@@ -209,6 +209,12 @@ class Recording:
         """Return a path of fewer samples: between two of them each joint goes evenly, to so many degrees.
 
         Times count: where the arm was held still, or slowed down, a sample stays.
+
+        Args:
+            tolerance: Degrees, 0 or more.
+
+        Raises:
+            ValueError: It is out of range.
         """
         limit = check_duration(tolerance, "tolerance")
         path = self.path

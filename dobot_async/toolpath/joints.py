@@ -21,7 +21,7 @@ from dobot_async.toolpath.plane import Place
 
 __all__ = ["JointWalk", "check_joints"]
 
-logger = logging.getLogger("dobot_async.toolpath")
+logger: logging.Logger = logging.getLogger("dobot_async.toolpath")
 OWN = 15.0  # mm by which the place that the joints give may miss the one that the arm tells
 NEAR = 1.0  # mm; a place that is nearer to the last one needs no look of its own
 TURN = 30.0  # degrees that a joint may turn from one place to the next one: beyond that the arm is at a singularity

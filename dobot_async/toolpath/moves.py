@@ -122,9 +122,8 @@ def from_point(moves: Sequence[ToolpathMove], point: float) -> list[ToolpathMove
     """Return the moves of a laser's stroke from a place in it on, which is told in points."""
     behind = int(point)
     start, end = moves[behind].place, moves[behind + 1].place
-    share = point - behind
-    place = tuple(a + share * (b - a) for a, b in zip(start, end, strict=True))
-    return [replace(moves[0], place=place), *moves[behind + 1 :]] if point else list(moves)  # type: ignore[arg-type]
+    place = between(start, end, point - behind)
+    return [replace(moves[0], place=place), *moves[behind + 1 :]] if point else list(moves)
 
 
 def check_moves(
@@ -166,12 +165,17 @@ ON_THE_WAY = {
 }
 
 
+def between(start: Place, end: Place, share: float) -> Place:
+    """The place behind a share, 0 to 1, of a straight way."""
+    x, y, z = (a + share * (b - a) for a, b in zip(start, end, strict=True))
+    return x, y, z
+
+
 def places(here: Place | None, there: Place) -> Iterator[Place]:
     """Places on a way, every few mm, its end the last."""
     count = max(1, math.ceil(math.dist(here, there) / LOOK)) if here else 1
     for number in range(1, count):
-        share = number / count
-        yield tuple(a + share * (b - a) for a, b in zip(here or there, there, strict=True))  # type: ignore[misc]
+        yield between(here or there, there, number / count)
 
     yield there
 

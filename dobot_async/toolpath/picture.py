@@ -114,12 +114,13 @@ def open_picture(source: Source, name: str) -> Image:
 
 def size_of(picture: Image, width: SupportsFloat | None, height: SupportsFloat | None) -> tuple[float, float]:
     """Return width and height in mm, with the picture's proportions where one is not given."""
-    if width is None and height is None:
-        width = 100.0
-
     ratio = picture.height / picture.width
-    across = positive(width, "width") if width is not None else positive(height, "height") / ratio
-    return across, positive(height, "height") if height is not None else across * ratio
+    up = None if height is None else positive(height, "height")
+    if width is None:
+        return (100.0, 100.0 * ratio) if up is None else (up / ratio, up)
+
+    across = positive(width, "width")
+    return across, across * ratio if up is None else up
 
 
 def darkness(picture: Image, columns: int, rows: int) -> Darkness:
@@ -130,9 +131,9 @@ def darkness(picture: Image, columns: int, rows: int) -> Darkness:
     return [[1 - value / 255 for value in data[row * columns : (row + 1) * columns]] for row in range(rows)]
 
 
-def positive(value: SupportsFloat | None, name: str) -> float:
+def positive(value: SupportsFloat, name: str) -> float:
     """A length above 0."""
-    found = to_float(value, name)  # type: ignore[arg-type]
+    found = to_float(value, name)
     if not 0 < found < math.inf:
         raise ValueError(f"{name} must be above 0 mm and finite, not {value!r}")
 

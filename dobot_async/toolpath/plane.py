@@ -137,7 +137,13 @@ class WorkPlane:
         return cross(self.x_axis, self.y_axis)
 
     def to_arm(self, x: float, y: float, height: float = 0.0) -> Place:
-        """Return the arm's x, y, z of a place on the plane, or `height` mm above it."""
+        """Return the arm's x, y, z of a place on the plane, or `height` mm above it.
+
+        Args:
+            x: mm, from the plane's origin.
+            y: mm, from the plane's origin.
+            height: mm away from the paper; below 0 into it.
+        """
         along, across, up = self.x_axis, self.y_axis, self.normal
         return (
             self.origin[0] + x * along[0] + y * across[0] + height * up[0],
@@ -146,7 +152,13 @@ class WorkPlane:
         )
 
     def to_plane(self, x: float, y: float, z: float) -> OnPlane:
-        """Return where a place of the arm is on the plane, and how high above it."""
+        """Return where a place of the arm is on the plane, and how high above it.
+
+        Args:
+            x: mm, as the arm counts.
+            y: mm.
+            z: mm.
+        """
         off = minus((x, y, z), self.origin)
         return OnPlane(dot(off, self.x_axis), dot(off, self.y_axis), dot(off, self.normal))
 

@@ -113,7 +113,15 @@ class Preview:
         return data.getvalue()
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write it to a file whose name ends in .svg or .png; raise ValueError for others."""
+        """Write it to a file whose name ends in .svg or .png; raise ValueError for others.
+
+        Args:
+            path: Of the file, which is replaced if it is there.
+
+        Raises:
+            ValueError: Its name ends otherwise.
+            OSError: It cannot be written.
+        """
         suffix = Path(path).suffix.lower()
         if suffix not in {".svg", ".png"}:
             raise ValueError(f"a preview is saved as .svg or .png, not as {str(path)!r}")

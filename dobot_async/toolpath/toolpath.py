@@ -38,7 +38,15 @@ class Toolpath:
 
     @classmethod
     def of(cls, *lines: Iterable[Point], power: float = 100.0) -> Toolpath:
-        """Return a toolpath of lines, each given by its points (x, y) in mm."""
+        """Return a toolpath of lines, each given by its points (x, y) in mm.
+
+        Args:
+            *lines: Each a series of points, one at least.
+            power: Percent of the laser's power, or of the pen's pressure: 0 to 100.
+
+        Raises:
+            ValueError: A line has no point, or a number is out of range.
+        """
         return cls(tuple(Stroke(tuple(line), power) for line in lines))
 
     def __len__(self) -> int:
@@ -86,7 +94,11 @@ class Toolpath:
         return tuple(dict.fromkeys(stroke.layer for stroke in self.strokes))
 
     def only(self, *layers: str) -> Toolpath:
-        """Return the strokes of some layers; raise ValueError for a layer that there is not."""
+        """Return the strokes of some layers; raise ValueError for a layer that there is not.
+
+        Args:
+            *layers: Their names; see `layers`.
+        """
         missing = set(layers) - set(self.layers)
         if missing:
             raise ValueError(f"no layer {min(missing)!r}; there are: {', '.join(map(repr, self.layers))}")
@@ -94,17 +106,33 @@ class Toolpath:
         return self._each(stroke for stroke in self.strokes if stroke.layer in layers)
 
     def with_power(self, power: float) -> Toolpath:
-        """Return it with one power, in percent, for all strokes."""
+        """Return it with one power, in percent, for all strokes.
+
+        Raises:
+            ValueError: It is not in 0 to 100.
+        """
         return self._each(replace(stroke, power=power) for stroke in self.strokes)
 
     def with_speed(self, speed: float | None) -> Toolpath:
-        """Return it with one speed, in mm/s, for all strokes; None leaves it to who draws."""
+        """Return it with one speed, in mm/s, for all strokes; None leaves it to who draws.
+
+        Raises:
+            ValueError: It is not above 0.
+        """
         return self._each(replace(stroke, speed=speed) for stroke in self.strokes)
 
     # Maps.
 
     def translate(self, x: SupportsFloat = 0.0, y: SupportsFloat = 0.0) -> Toolpath:
-        """Return it moved by so many mm."""
+        """Return it moved by so many mm.
+
+        Args:
+            x: mm, to the right.
+            y: mm, up.
+
+        Raises:
+            ValueError: A number is not finite.
+        """
         return self.transform(Matrix(1, 0, 0, 1, finite(x, "x"), finite(y, "y")))
 
     def scale(self, x: SupportsFloat, y: SupportsFloat | None = None, *, about: Point = (0.0, 0.0)) -> Toolpath:
@@ -114,6 +142,9 @@ class Toolpath:
             x: Factor along x.
             y: Factor along y; that along x by default.
             about: The point that stays.
+
+        Raises:
+            ValueError: A factor is 0, or not finite.
         """
         across = finite(x, "x")
         up = across if y is None else finite(y, "y")
@@ -123,13 +154,29 @@ class Toolpath:
         return self.transform(Matrix(across, 0, 0, up, 0, 0).about(about))
 
     def rotate(self, degrees: SupportsFloat, *, about: Point = (0.0, 0.0)) -> Toolpath:
-        """Return it turned to the left by so many degrees, about a point that stays."""
+        """Return it turned to the left by so many degrees, about a point that stays.
+
+        Args:
+            degrees: To the left; negative ones to the right.
+            about: The point that stays, mm.
+
+        Raises:
+            ValueError: It is not finite.
+        """
         angle = math.radians(math.remainder(finite(degrees, "degrees"), 360))
         cos, sin = math.cos(angle), math.sin(angle)
         return self.transform(Matrix(cos, sin, -sin, cos, 0, 0).about(about))
 
     def mirror(self, axis: Literal["x", "y"], *, about: Point = (0.0, 0.0)) -> Toolpath:
-        """Return it mirrored: "x" turns right and left, "y" top and bottom round."""
+        """Return it mirrored: "x" turns right and left, "y" top and bottom round.
+
+        Args:
+            axis: The axis whose coordinates change their sign.
+            about: A point of the line that stays, mm.
+
+        Raises:
+            ValueError: The axis is another one.
+        """
         check_choice("axis", axis, "x", "y")
         matrix = Matrix(-1, 0, 0, 1, 0, 0) if axis == "x" else Matrix(1, 0, 0, -1, 0, 0)
         return self.transform(matrix.about(about))
@@ -155,6 +202,9 @@ class Toolpath:
             at: Its lower left corner.
             margin: mm that stay free on all sides.
             rotate: Turn it by a quarter if it becomes larger by that.
+
+        Raises:
+            ValueError: The margin leaves nothing of the rectangle, or there is no stroke.
         """
         free = check_duration(margin, "margin")
         across, up = finite(width, "width") - 2 * free, finite(height, "height") - 2 * free
@@ -174,7 +224,11 @@ class Toolpath:
     # Fewer points, less travel.
 
     def simplify(self, tolerance: SupportsFloat) -> Toolpath:
-        """Return it with fewer points, none of which is missed by more than `tolerance` mm."""
+        """Return it with fewer points, none of which is missed by more than `tolerance` mm.
+
+        Raises:
+            ValueError: It is below 0, or not finite.
+        """
         most = check_duration(tolerance, "tolerance")
         return self._each(simplified(stroke, most) for stroke in self.strokes)
 

@@ -20,6 +20,11 @@ async def draw(arm: DrawingArm, toolpath: Toolpath, plane: WorkPlane, *, first: 
         plane: Where the paper lies.
         first: The stroke, from 0, to begin with.
         options: As for `Drawing`: speed, tolerance, acceleration, percent, rate, progress.
+
+    Raises:
+        ValueError: An option is out of range.
+        UnreachableStroke: A stroke is out of the arm's reach; nothing has moved.
+        DobotError: The arm failed, and was stopped; a note tells the stroke.
     """
     await Drawing(arm, toolpath, plane, tool="pen", **options).run(first=first)
 
@@ -37,5 +42,19 @@ async def engrave(
 
     The plane is that of the focus: the laser is moved in it, and lifted on the way to the first stroke alone. A dot is
     a line of 0.1 mm. With `first` and `point` it goes on where it was stopped.
+
+    Args:
+        arm: A connected Magician or UltraArm.
+        toolpath: What to engrave.
+        plane: Where the laser has its focus.
+        first: The stroke, from 0, to begin with.
+        point: How far in this stroke; see `Drawing.next_point`.
+        options: As for `Drawing`: speed, tolerance, acceleration, percent, rate, progress.
+
+    Raises:
+        ValueError: An option is out of range.
+        UnsupportedError: The arm has no laser.
+        UnreachableStroke: A stroke is out of the arm's reach; nothing has moved.
+        DobotError: The arm failed, and was stopped; a note tells the stroke.
     """
     await Drawing(arm, toolpath, plane, tool="laser", **options).run(first=first, point=point)

@@ -44,7 +44,12 @@ class TraceLine:
         return value if isinstance(value, str) else ""
 
     def number(self, name: str, otherwise: float = 0.0) -> float:
-        """Return a field that is a number."""
+        """Return a field that is a number.
+
+        Args:
+            name: Of the field.
+            otherwise: What is returned where it is no number, or not there.
+        """
         value = self.fields.get(name)
         return float(value) if isinstance(value, (int, float)) else otherwise
 

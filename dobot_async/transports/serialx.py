@@ -73,7 +73,7 @@ class SerialxTransport(PortTransport):
     """An open serial port."""
 
     _transport: BaseSerialTransport
-    errors = (OSError, SerialException)
+    errors: tuple[type[Exception], ...] = (OSError, SerialException)
 
     def discard(self) -> None:
         """Close it at once."""

@@ -117,7 +117,13 @@ class Link(Exchange[F]):
         return self._round_trip.smoothed
 
     def frame(self, command: Command[Q, Any], value: Q, *, queued: bool = False) -> F:
-        """Return the frame of a request; raise ValueError or TypeError where the arm could not take it."""
+        """Return the frame of a request; raise ValueError or TypeError where the arm could not take it.
+
+        Args:
+            command: The row of the family's command table.
+            value: Its parameters, None where it has none.
+            queued: Whether it is for the arm's queue.
+        """
         if self._read_only and command.write:
             raise ValueError(f"{command.name} is a command, and this connection only reads (control=False)")
 
@@ -177,6 +183,12 @@ class Link(Exchange[F]):
             repeatable: It may be sent again once it is known to have been lost.
             urgent: It goes ahead of everything, and is repeated until it is acknowledged.
             ready: Called whenever it is about to be sent; what this raises is raised, and nothing sent.
+
+        Raises:
+            ValueError: The timeout is not above 0.
+            ReplyTimeout: No answer came, or the link was too busy for it to be sent.
+            ProtocolError: An answer came that `accept` refuses.
+            ConnectionLost: The link is broken or closed.
         """
         if not timeout > 0:
             raise ValueError(f"timeout must be above 0 seconds, not {timeout!r}")

@@ -297,7 +297,7 @@ class Command(Generic[Q, R]):
 
 def commands_in(names: Mapping[str, object]) -> tuple[Command[Any, Any], ...]:
     """Returns the rows among the names of a module, in their order."""
-    return tuple(row for row in tuple(names.values()) if isinstance(row, Command))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+    return tuple(row for row in tuple(names.values()) if isinstance(row, Command))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType] - isinstance tells no type parameters
 
 
 def unpack(layout: struct.Struct, data: bytes, build: Callable[[tuple[Any, ...]], V]) -> V:

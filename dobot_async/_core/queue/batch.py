@@ -26,7 +26,16 @@ class BatchBuilder:
         self._queue = queue
 
     def put(self, command: Command[Q, Any], value: Q) -> Motion:
-        """Add any row of the table that may be queued."""
+        """Add any row of the table that may be queued.
+
+        Args:
+            command: A row of the table that may be queued.
+            value: Its parameters.
+
+        Raises:
+            ValueError: The parameters do not fit, or the command cannot be queued.
+            TypeError: They are of the wrong type.
+        """
         motion = Motion(self._queue, self._queue.prepare(command, value))
         self.motions.append(motion)
         return motion

@@ -77,7 +77,12 @@ class MotionQueue(QueueCore):
         return motion
 
     def prepare(self, command: Command[Q, Any], value: Q) -> Entry:
-        """Return a checked entry; raise ValueError or TypeError as `put` does."""
+        """Return a checked entry; raise ValueError or TypeError as `put` does.
+
+        Args:
+            command: A row of the table that may be queued.
+            value: Its parameters.
+        """
         return self._executor.prepare(command, value)
 
     async def put_all(
@@ -89,6 +94,9 @@ class MotionQueue(QueueCore):
             motions: What is to be sent.
             timeout: Seconds to wait for room.
             epoch: The epoch in which the steps that led here began; a stop since then lets nothing be sent.
+
+        Raises:
+            DobotError: As `put`.
         """
         timeout, call, epoch = check_timeout(timeout), object(), epoch or self.epoch
         for motion in motions:
@@ -209,11 +217,23 @@ class MotionQueue(QueueCore):
             raise another(failure)
 
     async def pause(self) -> None:
-        """Let the arm finish the command that it executes, and then wait; Motions stay pending."""
+        """Let the arm finish the command that it executes, and then wait; Motions stay pending.
+
+        Raises:
+            ReplyTimeout: The arm does not acknowledge it.
+            ConnectionLost: The link is gone.
+        """
         await self._executor.pause()
 
     async def resume(self) -> None:
-        """Let a paused arm go on; a stop ends this call, which raises why: MotionStopped, or the ArmAlarm behind it."""
+        """Let a paused arm go on; a stop ends this call, which raises why: MotionStopped, or the ArmAlarm behind it.
+
+        Raises:
+            MotionStopped: A stop ended this call.
+            ArmAlarm: An alarm was behind that stop.
+            ReplyTimeout: The arm does not acknowledge it.
+            ConnectionLost: The link is gone.
+        """
         await self.beside(self._executor.resume())
 
     async def stop(self, *, timeout: float = STAYING) -> None:
@@ -230,7 +250,15 @@ class MotionQueue(QueueCore):
         await self._stop(MotionStopped("the arm was told to stop"), timeout, halt=True)
 
     async def clear(self, *, timeout: float = STAYING) -> None:
-        """Throw away all that is queued, the running command included; its Motions raise MotionStopped. See `stop`."""
+        """Throw away all that is queued, the running command included; its Motions raise MotionStopped. See `stop`.
+
+        Args:
+            timeout: Seconds to wait until the arm has acknowledged it.
+
+        Raises:
+            ReplyTimeout: The arm has not acknowledged it yet.
+            ConnectionLost: The link is gone.
+        """
         await self._stop(MotionStopped("the arm's queue was cleared"), timeout, halt=False)
 
     async def aclose(self) -> None:

@@ -52,7 +52,12 @@ class Box:
         )
 
     def distance(self, x: float, y: float) -> float:
-        """Returns how far it is from a vertical line, mm; 0 for a line that goes through it."""
+        """Returns how far it is from a vertical line, mm; 0 for a line that goes through it.
+
+        Args:
+            x: Of the line, mm.
+            y: Of the line, mm.
+        """
         ways = (max(low - value, value - high, 0.0) for value, (low, high) in ((x, self.x), (y, self.y)))
         return math.hypot(*ways)
 
@@ -115,7 +120,12 @@ class Cylinder:
         return math.hypot(x - self.x, y - self.y) <= self.radius + margin and low - margin <= z <= high + margin
 
     def distance(self, x: float, y: float) -> float:
-        """Returns how far it is from a vertical line, mm; 0 for a line that goes through it."""
+        """Returns how far it is from a vertical line, mm; 0 for a line that goes through it.
+
+        Args:
+            x: Of the line, mm.
+            y: Of the line, mm.
+        """
         return max(0.0, math.hypot(x - self.x, y - self.y) - self.radius)
 
     def outside(self, place: XYZ) -> float:
@@ -125,7 +135,13 @@ class Cylinder:
         return math.hypot(*(max(0.0, way) for way in ways)) or max(ways)
 
     def stretch(self, start: XYZ, end: XYZ, margin: float = 0.0) -> Span | None:
-        """Returns the part of a line that lies in it, as shares of the line; see `Box.stretch`."""
+        """Returns the part of a line that lies in it, as shares of the line; see `Box.stretch`.
+
+        Args:
+            start: Where the line begins.
+            end: Where it ends.
+            margin: mm by which the shape is grown; below 0 it is shrunk.
+        """
         low, high = self.z
         upright = slab(start[2], end[2], (low - margin, high + margin))
         return common((upright, self._disc(start, end, self.radius + margin)))

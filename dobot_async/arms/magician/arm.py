@@ -48,7 +48,7 @@ R = TypeVar("R")
 
 
 class Magician(Readings, Sensors, HandGuided, Verbs[Coroutine[Any, Any, None]]):
-    """A Dobot Magician; made by `connect`. Each verb returns when the arm has done it.
+    """A Dobot Magician; made by `connect`. Each verb returns when the arm has done it, and raises what `Arm` names.
 
     A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext, suppress
-from typing import Any
 
 import anyio
 
@@ -14,6 +13,7 @@ from dobot_async._core.util.arguments import check_duration
 from dobot_async._core.util.tasks import run_shielded
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import Alarm, decode, faults
+from dobot_async.arms.magician.frame import Frame
 from dobot_async.arms.magician.jogs import Jog, check_limits
 from dobot_async.arms.magician.queue import MagicianQueue
 from dobot_async.arms.magician.stopping import STILL
@@ -27,7 +27,7 @@ TEACH_INTERVAL = 0.05
 class HandGuided:
     """The part of a Magician that jogs, and that is guided by hand."""
 
-    link: Link[Any]
+    link: Link[Frame]
     queue: MagicianQueue
 
     def _kept(self, direction: Jog) -> AbstractAsyncContextManager[None]:  # noqa: ARG002 - where it may go anywhere
@@ -96,6 +96,10 @@ class HandGuided:
 
         Args:
             mode: A pose when the key is released, or at intervals while it is held. Manual 2.7.
+
+        Raises:
+            ReplyTimeout: The arm does not answer in time.
+            ConnectionLost: The link is gone.
         """
         await self.link.request(c.SET_HHT_TRIG_MODE, mode)
         await self.link.request(c.SET_HHT_TRIG_OUTPUT_ENABLED, value=True)

@@ -32,7 +32,12 @@ EVERYTHING: Need = frozenset({"pose", "rail"})
 
 
 class MotionVerbs(Generic[T]):
-    """What moves the arm; T is what each verb returns in its place."""
+    """What moves the arm; T is what each verb returns in its place.
+
+    Raises:
+        ValueError: Of each verb: an argument is out of range, or the arm cannot get there; no motion was sent.
+        TypeError: An argument is of the wrong type.
+    """
 
     @abstractmethod
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> T:

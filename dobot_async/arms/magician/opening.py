@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dobot_async._core.link.link import Link
 from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame
 from dobot_async.errors import ConnectFailed
 
 __all__ = ["BARRIERS", "silent"]
@@ -27,7 +26,7 @@ BARRIERS = (
 """Cheap reads used as barriers: the answer to one proves that earlier requests will not be answered."""
 
 
-def silent(link: Link[Any]) -> ConnectFailed:
+def silent(link: Link[Frame]) -> ConnectFailed:
     """Why no arm answered, as far as what came instead tells."""
     if link.stats.junk_bytes:
         return ConnectFailed(

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dobot_async._core.link.link import Link
 from dobot_async.arms.info import DeviceInfo
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.declared import told_rail
+from dobot_async.arms.magician.frame import Frame
 
 __all__ = ["Readings"]
 
@@ -20,7 +19,7 @@ class Readings:
         ConnectionLost: The link is gone.
     """
 
-    link: Link[Any]
+    link: Link[Frame]
 
     async def get_pose(self, *, timeout: float | None = None) -> c.Pose:
         """Returns where the tool is (mm, degrees) and the joints (degrees). Manual 2.4.1."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import anyio
 
@@ -17,6 +17,7 @@ from dobot_async._core.util.arguments import check_timeout
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.arguments import to_address, to_choice, to_flag
 from dobot_async.arms.magician.declared import ANALOG, INPUT
+from dobot_async.arms.magician.frame import Frame
 from dobot_async.arms.magician.queue import MagicianQueue
 from dobot_async.errors import ReplyTimeout
 
@@ -35,7 +36,7 @@ class Sensors:
         TypeError: An argument is of the wrong type; nothing was sent.
     """
 
-    link: Link[Any]
+    link: Link[Frame]
     queue: MagicianQueue
 
     async def get_input(self, address: int, *, timeout: float | None = None) -> bool:

@@ -11,12 +11,13 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple, TypeVar, cast
 
 from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.wire import Command
 from dobot_async.arms.magician import commands as c
 from dobot_async.arms.magician.alarms import Alarm, decode
+from dobot_async.arms.magician.frame import Frame
 from dobot_async.errors import MotionUnknown, ReplyTimeout
 
 __all__ = ["GARBAGE", "SILENCE", "ArmStatus"]
@@ -52,7 +53,7 @@ class ArmStatus:
         restarts: How often the arm was seen to have been switched off and on.
     """
 
-    def __init__(self, link: Link[Any], restarted: Callable[[], None]) -> None:
+    def __init__(self, link: Link[Frame], restarted: Callable[[], None]) -> None:
         self.completed: int = -1
         self.restarts: int = 0
         self._link = link

@@ -21,7 +21,12 @@ Q = TypeVar("Q")
 
 
 class ToolVerbs(Generic[T]):
-    """What is beside the motions; T is what each verb returns in its place."""
+    """What is beside the motions; T is what each verb returns in its place.
+
+    Raises:
+        ValueError: Of each verb: an argument is out of range; nothing was sent.
+        TypeError: An argument is of the wrong type.
+    """
 
     @abstractmethod
     def perform(self, command: Command[Q, Any], value: Q, timeout: float | None) -> T:

@@ -16,6 +16,7 @@ from dobot_async._core.link.link import Link
 from dobot_async._core.protocol.wire import Command
 from dobot_async._core.util.arguments import check_timeout
 from dobot_async.arms.magician import commands as c
+from dobot_async.arms.magician.frame import Frame
 from dobot_async.errors import ReplyTimeout
 
 __all__ = ["WiFi", "WiFiSettings"]
@@ -48,7 +49,7 @@ class WiFiSettings:
 class WiFi:
     """An arm's Wi-Fi; `arm.wifi`. It needs the vendor's Wi-Fi module in the arm's serial socket."""
 
-    def __init__(self, link: Link[Any]) -> None:
+    def __init__(self, link: Link[Frame]) -> None:
         self._link = link
 
     async def get_settings(self, *, timeout: float | None = None) -> WiFiSettings:
@@ -118,7 +119,12 @@ class WiFi:
             await self._link.request(command, value, timeout=timeout)
 
     async def connected(self, *, timeout: float | None = None) -> bool:
-        """Returns whether the arm is in its network. Manual 2.18.8."""
+        """Returns whether the arm is in its network. Manual 2.18.8.
+
+        Raises:
+            ReplyTimeout: No answer came.
+            ConnectionLost: The link is gone.
+        """
         return await self._link.request(c.GET_WIFI_CONNECT_STATUS, None, timeout=timeout)
 
     async def wait_connected(self, timeout: float = 30.0) -> None:

@@ -44,7 +44,7 @@ TOLERANCE: Tolerance = (4.0, 8.0)
 
 
 class MyCobot(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
-    """An arm behind a link; made by `MyCobot.connect`. Each verb returns when the arm has done it.
+    """An arm behind a link; made by `MyCobot.connect`. Each verb returns when it is done, and raises what `Arm` names.
 
     A motion belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
 

@@ -111,7 +111,7 @@ class Packed(Generic[T]):
 
     def __init__(self, kind: type[T], sizes: Sizes = UNSIZED) -> None:
         hints = get_type_hints(kind, include_extras=True)
-        names = [each.name for each in fields(kind)]  # type: ignore[arg-type]
+        names = [each.name for each in fields(kind)]  # type: ignore[arg-type] # the type of a record is that of a dataclass
         self.kind = kind
         self.sizes = sizes
         self.parts: list[tuple[str, Fixed, Any]] = [(name, *fixed_of(name, hints[name])) for name in names]
@@ -155,8 +155,9 @@ class Value(Generic[T]):
 
     def decode(self, data: bytes) -> T:
         """Unpack a value; the bytes must be exactly its own."""
+        value: T
         [value] = decode(self.parts, data, self.sizes)
-        return value  # type: ignore[no-any-return]
+        return value
 
     @property
     def lengths(self) -> frozenset[int] | None:

@@ -95,14 +95,24 @@ class CobotModel:
             raise ValueError(f"a {self.title} has joints 1 to {self.joints}, not {joint}")
 
     def check_joint(self, joint: int, angle: float) -> None:
-        """Raise ValueError for a joint that it does not have, or an angle beyond the joint's limits."""
+        """Raise ValueError for a joint that it does not have, or an angle beyond the joint's limits.
+
+        Args:
+            joint: From 1.
+            angle: Degrees.
+        """
         self.check_has_joint(joint)
         low, high = self.joint_limits[joint - 1]
         if not low <= angle <= high:
             raise ValueError(f"joint {joint} must be in {low:g} to {high:g} degrees, not {angle!r}")
 
     def check_coord(self, axis: int, value: float) -> None:
-        """Raise ValueError for an axis that it does not have, or a coordinate that it never reaches."""
+        """Raise ValueError for an axis that it does not have, or a coordinate that it never reaches.
+
+        Args:
+            axis: From 1, in the order of x, y, z, rx, ry, rz.
+            value: mm or degrees.
+        """
         self.check_axis(axis)
         low, high = self.reach[axis - 1]
         if not low <= value <= high:
@@ -113,12 +123,20 @@ class CobotModel:
         if not 1 <= axis <= len(self.reach):
             raise ValueError(f"a {self.title} has the axes 1 to {len(self.reach)}, not {axis}")
 
-    def check(self, command: Command[Any, Any], value: Any) -> None:
-        """Raise ValueError for parameters of a command that this model cannot do, whatever its pose."""
+    def check(self, command: Command[Any, Any], value: object) -> None:
+        """Raise ValueError for parameters of a command that this model cannot do, whatever its pose.
+
+        Args:
+            command: A row of the table.
+            value: Its parameters.
+        """
         check(self, command, value)
 
     def limited(self, limits: Mapping[str, Range]) -> CobotModel:
         """Return this model with limits of the user's own, by the words j1, j2 ... and x, y, z, rx, ry, rz.
+
+        Args:
+            limits: The least and the greatest number of each, in mm or degrees; what is not named stays.
 
         Raises:
             ValueError: There is no such joint or axis, or the numbers are no range.

@@ -164,7 +164,12 @@ class Readings:
         return bool((await self._channel.ask(row, pin, timeout=timeout)).level)
 
     async def get_gripper(self, *, kind: c.GripperType | None = None, timeout: float | None = None) -> int:
-        """Return how far the gripper is open, 0 to 100 percent; raise CommandRejected if no gripper answers the arm."""
+        """Return how far the gripper is open, 0 to 100 percent; raise CommandRejected if no gripper answers the arm.
+
+        Args:
+            kind: Which gripper it is, where the firmware has to be told.
+            timeout: Seconds.
+        """
         return check_gripper(await self._channel.ask(c.GET_GRIPPER_VALUE, kind, timeout=timeout))
 
     async def get_encoders(self, *, timeout: float | None = None) -> tuple[int, ...]:
@@ -246,15 +251,30 @@ class Readings:
         await self._channel.tell(c.SET_WORLD_REFERENCE, coords, timeout=timeout)
 
     async def set_reference_frame(self, frame: c.ReferenceFrame, *, timeout: float | None = None) -> None:
-        """Say in which frame coordinates are."""
+        """Say in which frame coordinates are.
+
+        Args:
+            frame: That of the arm's base, or the world's; see `set_world`.
+            timeout: Seconds.
+        """
         await self._channel.tell(c.SET_REFERENCE_FRAME, frame, timeout=timeout)
 
     async def set_end_type(self, end: c.EndType, *, timeout: float | None = None) -> None:
-        """Say whether coordinates are the flange's or the tool's."""
+        """Say whether coordinates are the flange's or the tool's.
+
+        Args:
+            end: The flange, or the tool; see `set_tool`.
+            timeout: Seconds.
+        """
         await self._channel.tell(c.SET_END_TYPE, end, timeout=timeout)
 
     async def set_movement_type(self, mode: c.MoveMode, *, timeout: float | None = None) -> None:
-        """Say how the arm moves to a point where the motion does not say it."""
+        """Say how the arm moves to a point where the motion does not say it.
+
+        Args:
+            mode: ANGULAR moves the joints, LINEAR the tool along a straight line.
+            timeout: Seconds.
+        """
         await self._channel.tell(c.SET_MOVEMENT_TYPE, mode, timeout=timeout)
 
     async def _switch(

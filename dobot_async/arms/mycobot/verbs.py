@@ -36,8 +36,7 @@ class Verbs(Generic[T]):
     """What one can tell the arm to do; T is what each verb returns in its place. A speed is 1 to 100 percent.
 
     Raises:
-        ValueError: Of each verb: a number is out of range or beyond the model's limits, or the model does not know the
-            command; nothing was sent.
+        ValueError: Of each verb: a number is out of range, or the model has no such command; nothing was sent.
         TypeError: Something is of the wrong type.
     """
 
@@ -51,7 +50,12 @@ class Verbs(Generic[T]):
         """Do, or queues, or collects a command."""
 
     def home(self, *, speed: int = 10, timeout: float | None = None) -> T:
-        """Move all joints to 0 degrees; these arms need no calibration after power-up."""
+        """Move all joints to 0 degrees; these arms need no calibration after power-up.
+
+        Args:
+            speed: Percent, 1 to 100.
+            timeout: Seconds.
+        """
         return self.move_joints(*(0.0,) * self.model.joints, speed=speed, timeout=timeout)
 
     def move_joints(self, *angles: float, speed: int = SPEED, timeout: float | None = None) -> T:
@@ -76,7 +80,14 @@ class Verbs(Generic[T]):
         return self.perform(c.SEND_ANGLE, c.JointMove(joint, angle, speed), timeout)
 
     def step_joint(self, joint: int, degrees: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Move one joint (from 1) by degrees."""
+        """Move one joint (from 1) by degrees.
+
+        Args:
+            joint: From 1.
+            degrees: Either way.
+            speed: Percent, 1 to 100.
+            timeout: Seconds.
+        """
         return self.perform(c.JOG_INCREMENT, c.JointMove(joint, degrees, speed), timeout)
 
     def move_to(
@@ -175,7 +186,14 @@ class Verbs(Generic[T]):
         return self.perform(c.SEND_COORD, c.CoordMove(axis_number(axis), value, speed), timeout)
 
     def step_coord(self, axis: Axis, value: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Move the tool along one axis by mm or degrees; not on a myArm 300 or a myPalletizer."""
+        """Move the tool along one axis by mm or degrees; not on a myArm 300 or a myPalletizer.
+
+        Args:
+            axis: One of x, y, z, rx, ry, rz.
+            value: mm or degrees, either way.
+            speed: Percent, 1 to 100.
+            timeout: Seconds.
+        """
         return self.perform(c.JOG_INCREMENT_COORD, c.CoordStep(axis_number(axis), value, speed), timeout)
 
     def move_elbow(self, angle: float, *, speed: int = SPEED, timeout: float | None = None) -> T:
@@ -189,11 +207,22 @@ class Verbs(Generic[T]):
         return self.perform(c.SET_SOLUTION_ANGLES, c.SetSolutionAngle(angle, speed), timeout)
 
     def move_encoders(self, *encoders: int, speed: int = SPEED, timeout: float | None = None) -> T:
-        """Move all servos to positions of 0 to 4096; 2048 is 0 degrees. Joint limits are not looked at."""
+        """Move all servos to positions of 0 to 4096; 2048 is 0 degrees. Joint limits are not looked at.
+
+        Args:
+            *encoders: 0 to 4096, one for each joint.
+            speed: Percent, 1 to 100.
+            timeout: Seconds.
+        """
         return self.perform(c.SET_ENCODERS, c.SetEncoders(encoders, speed), timeout)
 
     def wait(self, seconds: float, *, timeout: float | None = None) -> T:
-        """Hold the queue for a time, in seconds: 0 or more, and any fraction."""
+        """Hold the queue for a time.
+
+        Args:
+            seconds: 0 or more; fractions count.
+            timeout: Seconds.
+        """
         return self.perform(WAIT, seconds, timeout)
 
     def gripper(
@@ -246,7 +275,13 @@ class Verbs(Generic[T]):
         return self.perform(c.SET_COLOR, c.RGB(red, green, blue), timeout)
 
     def configure_pin(self, pin: int, mode: c.PinMode, *, timeout: float | None = None) -> T:
-        """Say what a pin of the Atom, at the tool, is used for."""
+        """Say what a pin of the Atom, at the tool, is used for.
+
+        Args:
+            pin: Its number, on the Atom.
+            mode: Input, output, or input with a pull-up resistor.
+            timeout: Seconds.
+        """
         return self.perform(c.SET_PIN_MODE, c.PinModeSetting(pin, mode), timeout)
 
     def set_pin(self, pin: int, level: bool, *, base: bool = False, timeout: float | None = None) -> T:
@@ -262,7 +297,14 @@ class Verbs(Generic[T]):
         return self.perform(row, c.PinLevel(pin, int(bool(level))), timeout)
 
     def set_pwm(self, pin: int, frequency: int, duty_cycle: int, *, timeout: float | None = None) -> T:
-        """Set a PWM output of the Atom: Hz, and 0 to 255 parts of 256."""
+        """Set a PWM output of the Atom: Hz, and 0 to 255 parts of 256.
+
+        Args:
+            pin: Its number, on the Atom.
+            frequency: Hz, 0 to 65535.
+            duty_cycle: 0 to 255 parts of 256.
+            timeout: Seconds.
+        """
         return self.perform(c.SET_PWM_OUTPUT, c.PWMOutput(pin, frequency, duty_cycle), timeout)
 
     def _coordinates(self, given: dict[str, Any]) -> tuple[float | None, ...]:

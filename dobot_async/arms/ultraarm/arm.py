@@ -43,7 +43,7 @@ R = TypeVar("R")
 
 
 class UltraArm(Readings, Jogging, Verbs[Coroutine[Any, Any, None]]):
-    """An ultraArm P340; made by `connect`. Each verb returns when the arm has done it.
+    """An ultraArm P340; made by `connect`. Each verb returns when the arm has done it, and raises what `Arm` names.
 
     A command belongs to the call that awaits it: if that is cancelled, or its timeout passes, the arm stops.
 

@@ -82,6 +82,10 @@ class Jogging:
 
         Args:
             timeout: Seconds to wait until the arm is seen to stand; it is told again after that, too, until it does.
+
+        Raises:
+            ReplyTimeout: The arm is not seen to stand yet.
+            ConnectionLost: The link is gone.
         """
         self.link.frame(c.JOG_STOP, None)
         limit = check_timeout(timeout)

@@ -138,7 +138,7 @@ class Whole(Words[T]):
         """Return the words, rounded down."""
         super().encode(value)
         whole: Any = {field.name: math.floor(getattr(value, field.name)) for field in self.fields}
-        return super().encode(replace(value, **whole))  # type: ignore[type-var]
+        return super().encode(replace(value, **whole))  # type: ignore[type-var] # a record is a dataclass
 
     def decode(self, data: bytes) -> T:
         """Read whole numbers."""

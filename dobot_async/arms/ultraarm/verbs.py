@@ -40,6 +40,10 @@ class Verbs(Generic[T]):
 
     Attributes:
         pump: Who is right about the pump.
+
+    Raises:
+        ValueError: Of each verb: an argument is out of range, or beyond the limits; nothing was sent.
+        TypeError: An argument is of the wrong type.
     """
 
     pump: Pump = "manual"
@@ -258,7 +262,12 @@ class Verbs(Generic[T]):
         return self.perform(c.RELEASE_GRIPPER, None, timeout)
 
     def laser(self, on: bool, *, timeout: float | None = None) -> T:
-        """Switch the laser. Manual 5, M3 and M5."""
+        """Switch the laser. Manual 5, M3 and M5.
+
+        Args:
+            on: Whether it burns.
+            timeout: Seconds.
+        """
         return self.perform(c.LASER_ON if on else c.LASER_OFF, None, timeout)
 
     def pwm(self, duty: int, *, timeout: float | None = None) -> T:
@@ -274,7 +283,12 @@ class Verbs(Generic[T]):
         return self.perform(c.SET_PWM, c.PWM(duty), timeout)
 
     def fan(self, on: bool, *, timeout: float | None = None) -> T:
-        """Switch the fan, which is on unless told otherwise; the motors need it. Manual 5, M27 and M28."""
+        """Switch the fan, which is on unless told otherwise; the motors need it. Manual 5, M27 and M28.
+
+        Args:
+            on: Whether it turns.
+            timeout: Seconds.
+        """
         return self.perform(c.FAN_ON if on else c.FAN_OFF, None, timeout)
 
     def power_on(self, *, timeout: float | None = None) -> T:

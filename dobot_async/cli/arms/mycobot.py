@@ -148,7 +148,9 @@ def of_model(name: str) -> type[MyCobot]:
 
     class Model(MyCobot):
         @classmethod
-        def connect(cls, url: str, **options: Any) -> AbstractAsyncContextManager[Any]:  # type: ignore[override]
+        def connect(  # type: ignore[override] # what the command line gives is checked there
+            cls, url: str, **options: Any
+        ) -> AbstractAsyncContextManager[Any]:
             merged: dict[str, Any] = {"model": name, **options}
             return super().connect(url, **merged)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["TopicPublisher", "answering", "publishing", "settable"]
+__all__ = ["LivelinessToken", "TopicPublisher", "answering", "declared", "publishing", "settable"]
 
 
 class SettableConfig(Protocol):
@@ -58,6 +58,14 @@ class AnswerableQuery(Protocol):
         ...
 
 
+class LivelinessToken(Protocol):
+    """What says that somebody is there, until it is taken back."""
+
+    def undeclare(self) -> object:
+        """Take it back."""
+        ...
+
+
 def settable(config: zenoh.Config) -> SettableConfig:
     """Return a configuration as what can be set."""
     return config
@@ -71,3 +79,8 @@ def publishing(session: zenoh.Session) -> PublishingSession:
 def answering(query: zenoh.Query) -> AnswerableQuery:
     """Return a query as what can be answered."""
     return query
+
+
+def declared(token: zenoh.LivelinessToken) -> LivelinessToken:
+    """Return a token as what can be taken back."""
+    return token
