@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from quick_suite import CASES, FEWEST_EXAMPLES, QUICK_EXAMPLES, spread
+from quick_suite import CASES, FEWEST_EXAMPLES, PLAIN_CASES, QUICK_EXAMPLES, spread
 
 pytest_plugins = ["pytester"]
 
@@ -20,7 +20,11 @@ SUITE = f"""
 
     @pytest.mark.parametrize("trouble", ["a", "b", "c"])
     @pytest.mark.parametrize("verb", range(20))
-    def test_table(verb, trouble):
+    async def test_table(verb, trouble):
+        pass
+
+    @pytest.mark.parametrize("row", range({PLAIN_CASES + 5}))
+    def test_plain(row):
         pass
 
     @pytest.mark.cases(2)
@@ -43,14 +47,16 @@ SUITE = f"""
             file.write("x")
 """
 
-LEFT = f"left for `make test-full`: 1 tests marked full, {60 - CASES + 7} further cases"
+LEFT = f"left for `make test-full`: 1 tests marked full, {60 - CASES + 5 + 7} further cases"
 
 
 @pytest.fixture
 def suite(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.Pytester]:
     """A suite with the plugin, in a process of its own: it chooses a profile of hypothesis for all of the process."""
     monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'support'}")
-    pytester.makepyprojecttoml("[tool.pytest.ini_options]\naddopts = '-p no:cacheprovider -p no:dobot_async'\n")
+    pytester.makepyprojecttoml(
+        "[tool.pytest.ini_options]\nasyncio_mode = 'auto'\naddopts = '-p no:cacheprovider -p no:dobot_async'\n"
+    )
     pytester.makeconftest('pytest_plugins = ["quick_suite"]')
     pytester.makepyfile(test_it=SUITE)
     yield pytester
@@ -77,6 +83,7 @@ def test_a_few_cases_are_run_and_it_is_told_what_is_left(suite: pytest.Pytester)
     assert LEFT in told
     assert {name for name in quick if name.startswith("test_dear")} == {"test_dear[0]", "test_dear[8]"}
     assert len([name for name in quick if name.startswith("test_table")]) == CASES
+    assert len([name for name in quick if name.startswith("test_plain")]) == PLAIN_CASES
     assert {"test_table[0-a]", "test_table[19-c]"} <= quick
     assert len([name for name in quick if name.startswith("test_few")]) == CASES
     assert "test_flood" not in quick
@@ -95,7 +102,7 @@ def test_the_quick_suite_and_the_rest_are_the_full_one(suite: pytest.Pytester) -
 
     assert quick | rest == everything
     assert quick & rest == {"test_property"}
-    assert len(everything) == 60 + 9 + CASES + 2
+    assert len(everything) == 60 + PLAIN_CASES + 5 + 9 + CASES + 2
 
 
 @pytest.mark.full

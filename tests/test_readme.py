@@ -55,6 +55,7 @@ def execute(page: Path, source: str, line: int, names: dict[str, Any]) -> None:
         exec(code, names)
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_blocks_run(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dobot_async.arms.registry.REGISTERED", dict(REGISTERED))  # one page adds a family

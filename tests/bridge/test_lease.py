@@ -98,3 +98,24 @@ async def test_who_has_gone_while_it_waited_takes_the_lease_from_nobody() -> Non
 
     assert lease.holder is second
     assert not cut
+
+
+@pytest.mark.parametrize(("heard", "told"), [([True], 2), ([False, True], 3), ([False, False, True], 4)])
+@virtual
+async def test_behind_the_stop_that_was_heard_all_is_said_once_more(heard: list[bool], told: int) -> None:
+    """What was still in the queue may have switched something on after it was switched off."""
+    said: list[int] = []
+
+    async def stop(frames: Sequence[object]) -> list[bool]:
+        said.append(len(frames))
+        return [heard[min(len(said), len(heard)) - 1], True]
+
+    async def ask(_: object) -> bool:
+        return True
+
+    line: Any = SimpleNamespace(stop=stop, ask=ask)
+    family: Any = SimpleNamespace(proves_stop=True, stopping=["stop"], insisting=["stop"], may_be_silent=lambda _: True)
+    watch = SimpleNamespace(moving=lambda _: True, question="?", off=lambda: ["laser off"])
+    holder: Any = SimpleNamespace(watch=watch)
+    await Standstill(line, family, lambda *_: None).reach(holder)
+    assert said == [2] * told

@@ -166,6 +166,7 @@ def enders(family: str, verb: Verb, moment: str) -> list[str]:
     return [names[zlib.crc32(f"{family} {verb} {moment}".encode()) % len(names)]]
 
 
+@pytest.mark.cases(12)
 @pytest.mark.parametrize(("name", "verb"), TABLE, ids=[f"{name}-{str(verb).replace(' ', '_')}" for name, verb in TABLE])
 def test_a_call_on_a_dead_line_ends_when_it_is_ended(name: str, verb: Verb) -> None:
     faults = {}

@@ -52,6 +52,7 @@ def test_seeds(first: int) -> None:
             raise
 
 
+@pytest.mark.cases(5)
 @pytest.mark.filterwarnings("ignore::async_solipsism.exceptions.ResolutionWarning")
 @pytest.mark.parametrize("seed", HARD, ids=HARD.get)
 def test_seeds_that_once_broke_a_promise(seed: int) -> None:

@@ -6,9 +6,10 @@
     pytest FILE::TEST    all cases of what is named, whatever its marks are
 
 1. A test marked `full` is left out. Another test of the quick suite looks at the same behaviour, on fewer examples.
-2. Of a parametrised test CASES cases stay, or as many as its mark `cases(n)` says: the first, the last, and between
-   them those that bring most values of the parameters that no chosen case has. Where there are more values than cases,
-   which ones are tried depends on the test's name, so that tests that share a table try different rows of it.
+2. Of a parametrised test that runs a loop, or tries examples, CASES cases stay; of a plain function PLAIN_CASES; of any
+   test as many as its mark `cases(n)` says. They are the first, the last, and between them those that bring most values
+   of the parameters that no chosen case has. Where there are more values than cases, which ones are tried depends on
+   the test's name, so that tests that share a table try different rows of it.
 3. Hypothesis tries QUICK_EXAMPLES where it tries 100 in the full suite, and `examples(n)` in proportion, but not less
    than FEWEST_EXAMPLES.
 
@@ -18,6 +19,7 @@ The choice depends on names and parameters alone: it is the same in every proces
 from __future__ import annotations
 
 import gc
+import inspect
 import os
 import zlib
 from collections import defaultdict
@@ -28,6 +30,7 @@ import hypothesis
 import pytest
 
 CASES = 3
+PLAIN_CASES = 25
 QUICK_EXAMPLES = 12
 FEWEST_EXAMPLES = 5
 GOLDEN = 0.618  # steps of this part of the whole fall evenly, however many they are
@@ -110,10 +113,16 @@ def sampled(items: Sequence[pytest.Item]) -> set[pytest.Item]:
     chosen = set[pytest.Item]()
     for (place, name), cases in tests.items():
         mark = cases[0].get_closest_marker("cases")
-        limit = mark.args[0] if mark else CASES
+        limit = mark.args[0] if mark else CASES if is_dear(cases[0]) else PLAIN_CASES
         chosen.update(cases[index] for index in spread([values(item) for item in cases], limit, f"{place}::{name}"))
 
     return chosen
+
+
+def is_dear(item: pytest.Item) -> bool:
+    """Whether a case costs more than a call: it runs a loop, or tries examples."""
+    test = inspect.unwrap(item.obj) if isinstance(item, pytest.Function) else None
+    return inspect.iscoroutinefunction(test) or item.get_closest_marker("hypothesis") is not None
 
 
 def values(item: pytest.Item) -> frozenset[Hashable]:

@@ -73,6 +73,7 @@ def raise_alarm(family: str, line: BadLine, sim: Simulation) -> None:
 SPOILS = [lose_acknowledgement, lose_request, go_silent, cut_in_two, raise_alarm]
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("spoil", SPOILS, ids=lambda spoil: spoil.__name__)
 @pytest.mark.parametrize("family", ARMS)
 def test_what_failed_fails_alike(

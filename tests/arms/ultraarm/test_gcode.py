@@ -296,3 +296,11 @@ async def test_a_file(tmp_path: Path) -> None:
     assert parse_gcode(file) == parse_gcode(str(file)) == parse_gcode(SQUARE)
     with pytest.raises(OSError, match="missing"):
         parse_gcode(tmp_path / "missing.gcode")
+
+
+@virtual
+async def test_a_program_is_absolute_whatever_was_said_to_the_arm_before() -> None:
+    async with simulate("ultraarm", homed=True) as sim, UltraArm.connect(sim.url) as arm:
+        sim.arm.registers.relative = True  # another program has left it so
+        await arm.run_gcode(["G0 X220 Y0 Z60 F100", "G0 X200"])
+        assert sim.arm.pose.x == pytest.approx(200, abs=0.1)

@@ -14,6 +14,8 @@ from dobot_async.arms.ultraarm import commands as c
 from dobot_async.arms.ultraarm.jog import WORDS
 from dobot_async.simulator import Simulation, UltraArmQuirks, simulate
 
+pytestmark = pytest.mark.cases(3)
+
 
 def done(sim: Simulation, *names: str) -> list[Any]:
     return [each for each in sim.arm.executed if each.outcome == "done" and each.name in names]

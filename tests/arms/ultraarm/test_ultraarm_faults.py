@@ -14,6 +14,8 @@ from dobot_async import ArmAlarm, MotionUnknown, ReplyTimeout, UltraArm
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.simulator import DeviceOptions, Faults, Simulation, UltraArmQuirks, simulate
 
+pytestmark = pytest.mark.cases(3)
+
 FAST: dict[str, Any] = {"speed": 20}
 OUTCOMES = ["size", "ok", "nothing"]
 

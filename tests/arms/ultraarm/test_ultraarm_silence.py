@@ -24,6 +24,8 @@ from dobot_async import (
 from dobot_async.arms.ultraarm import commands as c
 from dobot_async.simulator import Faults, Simulation, UltraArmQuirks, simulate
 
+pytestmark = pytest.mark.cases(3)
+
 SILENCES = [1.0, 10.0, 60.0, 300.0]
 Call = Callable[[UltraArm], Coroutine[Any, Any, object]]
 

@@ -19,6 +19,8 @@ from virtual import run_virtual
 from dobot_async import ArmAlarm, CommandRejected, DobotError, MotionStopped, MotionUnknown, ReplyTimeout, UltraArm
 from dobot_async.simulator import Faults, Simulation, UltraArmQuirks, simulate
 
+pytestmark = pytest.mark.cases(3)
+
 START = (200.0, 0.0, 60.0)
 SOON = 2.0  # seconds within which a cancellation comes out
 Verbs = Any  # the arm, its queue, or a batch
