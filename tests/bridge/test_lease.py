@@ -114,7 +114,9 @@ async def test_behind_the_stop_that_was_heard_all_is_said_once_more(heard: list[
         return True
 
     line: Any = SimpleNamespace(stop=stop, ask=ask)
-    family: Any = SimpleNamespace(proves_stop=True, stopping=["stop"], insisting=["stop"], may_be_silent=lambda _: True)
+    family: Any = SimpleNamespace(
+        proves_stop=True, stopping=["stop"], escalated_stop=["stop"], ack_optional=lambda _: True
+    )
     watch = SimpleNamespace(moving=lambda _: True, question="?", off=lambda: ["laser off"])
     holder: Any = SimpleNamespace(watch=watch)
     await Standstill(line, family, lambda *_: None).reach(holder)

@@ -141,8 +141,9 @@ def test_ctrl_c_stops_a_picking(where: str) -> None:
         arm.wait(300)
 
     with cell(speed=2) as (sim, arm):
-        holds = (lambda: sim.arm.device.moving) if where == "on the way" else inside.is_set
-        with ctrl_c_once(holds), pytest.raises(KeyboardInterrupt):
+        device = sim.arm.device
+        holds = {"on the way": lambda: device.moving, "in the tool": lambda: inside.is_set() and bool(device.executing)}
+        with ctrl_c_once(holds[where]), pytest.raises(KeyboardInterrupt):
             pick(arm, SOURCE, tool=cup)
 
         assert sim.arm.device.idle
