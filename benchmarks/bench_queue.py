@@ -164,10 +164,10 @@ def main() -> None:
         for window in windows:
             rows += rows_of(link, window, *on_line(listen, window, each))
 
-    for window in (1, windows[-1]):
-        with arms(LINKS["115200 baud"], speed=AT_ONCE, loss=LOSS) as there:
-            lossy = [asyncio.run(by_driver(there.url, window, each)) for _ in range(ROUNDS)]
-            rows += rows_of(LOSSY, window, {"dobot_async": lossy}, there.counters["overflowed"])
+    with arms(LINKS["115200 baud"], speed=AT_ONCE, loss=LOSS) as there:
+        # Of a window that was lost in part nothing tells which commands the arm took: that is MotionUnknown.
+        lossy = [asyncio.run(by_driver(there.url, 1, each)) for _ in range(ROUNDS)]
+        rows += rows_of(LOSSY, 1, {"dobot_async": lossy}, there.counters["overflowed"])
 
     show("queue", rows, as_json=options.json, commands=options.commands)
 
