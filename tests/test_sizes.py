@@ -83,7 +83,6 @@ def test_no_module_is_longer_than_it_may_be() -> None:
     assert not long
 
 
-@pytest.mark.full
 def test_no_function_is_longer_than_it_may_be() -> None:
     long = {
         f"{module.relative_to(PACKAGE)}: {node.name}": lines
@@ -94,7 +93,6 @@ def test_no_function_is_longer_than_it_may_be() -> None:
     assert not long
 
 
-@pytest.mark.full
 def test_a_class_name_is_found_once() -> None:
     twice = {name: found for name, modules in classes() if len(modules) > 1 and (found := places(name, modules))}
     assert twice.keys() == PUBLIC, twice
