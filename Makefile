@@ -1,7 +1,7 @@
 # make demo      a pick-and-place cycle on the built-in simulator, over a real pseudo-terminal
 # make panel     a simulated arm in the browser: make panel [ARM_URL=sim:] [OPTIONS="--port 0"]
-# make test      the checkers and the quick suite: everything is tested, on few examples
-# make test-full the checkers and the whole suite, on all examples; with REST=1 only what `make test` has left out
+# make test      the quick checkers and the quick suite: everything is tested, on few examples
+# make test-full all checkers and the whole suite, on all examples; with REST=1 only what `make test` has left out
 # make test-all  the test suite on every Python from 3.11 on that this machine has
 # make test-minimum  the test suite with the lowest version of everything that pyproject.toml declares
 # make docs      the site, in build/site, and what is promised of it; a warning is an error
@@ -14,11 +14,14 @@
 # make promises  what the driver promises on dead, slow and lossy lines, at many more moments than make test-full tries
 # make fuzz      each fuzz target for a minute: make fuzz [SECONDS=60] [TARGET=parser]
 
+# Tests start many programs, which would compile all that they import each time.
+unexport PYTHONDONTWRITEBYTECODE
+
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo panel sync lerobot test test-full test-all test-minimum check pytest docs dist sbom format clean fuzz promises soak
+.PHONY: demo panel sync lerobot test test-full test-all test-minimum check lint types pytest docs dist sbom format clean fuzz promises soak
 
 demo: $(VENV)/.cli
 	$(BIN)/python -m dobot_async demo
@@ -36,20 +39,25 @@ REST ?=
 # What the checkers say is kept back until the tests have ended.
 test: $(VENV)/.dev
 	@mkdir -p build
-	@$(MAKE) --no-print-directory check >build/check.txt 2>&1 & checks=$$!; \
+	@$(MAKE) --no-print-directory lint >build/check.txt 2>&1 & checks=$$!; \
 	$(BIN)/python $(PYTEST); tests=$$?; \
 	wait $$checks; checked=$$?; cat build/check.txt; exit $$((tests | checked))
 
-test-full: $(if $(REST),,check) pytest
+test-full: $(if $(REST),types,check) pytest
 
-# --verifytypes looks for libraries with the first python of the PATH, and does not see through an editable install.
-check: $(VENV)/.dev
+check: lint types
+
+# These remember what they have seen.
+lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+# --verifytypes looks for libraries with the first python of the PATH, and does not see through an editable install.
+types: $(VENV)/.dev
 	$(BIN)/basedpyright --project pyproject.toml --pythonpath $(BIN)/python
 	PYTHONPATH="$(CURDIR)" PATH="$(abspath $(BIN)):$$PATH" $(BIN)/basedpyright --verifytypes dobot_async --ignoreexternal
-	$(BIN)/lint-imports
 
 sync: $(VENV)/.dev
 	$(BIN)/python tests/sync/write_sync.py

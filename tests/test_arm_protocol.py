@@ -54,6 +54,7 @@ async def carry(arm: Arm, missing: tuple[str, ...]) -> list[str]:
     return lacks
 
 
+@pytest.mark.cases(1)
 @each_family
 @virtual
 async def test_one_program_drives_an_arm_of_any_family(model: str) -> None:

@@ -90,6 +90,7 @@ def test_targets_are_judged_by_the_rows_that_they_name() -> None:
     assert verdict["ultraArm: how late its end is noticed, beside pymycobot"] == "not measured"
 
 
+@pytest.mark.full
 def test_each_target_names_a_column_that_its_benchmark_has() -> None:
     command = [sys.executable, "-m", "benchmarks.bench_startup", "--json", "--quick"]
     done = subprocess.run(command, cwd=BENCHMARKS.parent, capture_output=True, text=True, timeout=100, check=True)

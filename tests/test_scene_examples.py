@@ -78,6 +78,7 @@ async def test_the_rail_carries_each_piece_to_its_place() -> None:
         assert scene.pieces[str(n)].position == pytest.approx((x, y + 700, -138), abs=0.1)
 
 
+@pytest.mark.full
 async def test_the_drawing_is_on_the_paper() -> None:
     """The pen has gone through each point of the path, and everywhere else was on its way between two."""
     board = Block("board", (230, 0), (100, 100, 38.5))
@@ -137,6 +138,7 @@ def seen(x: float, y: float) -> tuple[float, float]:
     return 320 + (y * 2.1 - (x - 230) * 0.1) / away, 240 + ((x - 230) * 1.9 + y * 0.05) / away
 
 
+@pytest.mark.full
 async def test_what_a_camera_sees_is_sorted_by_its_colour(tmp_path: Path) -> None:
     """The picture is drawn as the camera sees the tops of the parts; marks were touched and noted to a pixel."""
     parts = {

@@ -28,7 +28,6 @@ def words(path: Path) -> set[str]:
     return imported | {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
 
 
-@pytest.mark.full
 def test_modules_are_named_as_strings_in_the_places_alone_that_import_late() -> None:
     late = {path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*.py") if words(path) & IMPORTERS}
     assert late == {

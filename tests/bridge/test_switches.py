@@ -89,6 +89,7 @@ class Bench:
         return [each for each in (self.arm.laser, *motors, self.arm.device.moving) if each]
 
 
+@pytest.mark.full
 def test_a_laser_is_off_whatever_four_commands_came_behind_a_long_one() -> None:
     row, on, off = THINGS["laser"]
     words = {"on": frame(row, on), "off": frame(row, off), **{verb: VERBS[verb] for verb in ("force-stop", "clear")}}

@@ -141,6 +141,7 @@ async def test_run(file: Path, arms: dict[str, Simulation], tmp_path: Path) -> N
     assert places(arms["right"]) == [(200, -120), (250, 0)]
 
 
+@pytest.mark.full
 async def test_run_tells_the_line_of_a_failure_and_stops_all(
     file: Path, arms: dict[str, Simulation], tmp_path: Path
 ) -> None:

@@ -129,6 +129,7 @@ def test_a_gcode_file(tmp_path: Path) -> None:
     assert "for --arm ultraarm alone" in " ".join(other.output.split())
 
 
+@pytest.mark.full
 async def test_suction_and_stop_leave_the_rest_alone() -> None:
     async with simulate("ultraarm", homed=True, listen="tcp://127.0.0.1:0", speed=50) as sim:
 

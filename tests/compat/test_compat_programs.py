@@ -26,7 +26,7 @@ def test_one_import_is_changed(program: str) -> None:
     assert text.count("dobot_async") == 1
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @programs
 async def test_every_part_is_where_it_belongs(program: str) -> None:
     job = JOBS[program]
@@ -66,7 +66,7 @@ async def test_an_alarm_is_raised(program: str) -> None:
     assert "done" not in {each.outcome for each in done}
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @programs
 async def test_ctrl_c_stops_the_arms(program: str) -> None:
     """Ctrl-C comes out as KeyboardInterrupt, wherever the program is, and nothing moves after it."""

@@ -96,6 +96,7 @@ MOMENTS = pytest.mark.parametrize("moment", [0.0, 0.02, 0.1, 0.4, 0.6])
 DEAD = pytest.mark.parametrize("dead", [("left",), ("left", "right")])
 
 
+@pytest.mark.cases(6)
 @ALL
 @MOMENTS
 @DEAD

@@ -80,6 +80,7 @@ async def renewed(follow: Any, target: Any, seconds: float) -> int:
     return refused
 
 
+@pytest.mark.cases(2)
 @each_family
 @virtual
 async def test_a_target_outside_is_refused_by_its_name_and_the_one_before_stays(family: Family) -> None:
@@ -102,6 +103,7 @@ async def test_a_target_outside_is_refused_by_its_name_and_the_one_before_stays(
         assert worst(space, places) < SLACK[family.name]
 
 
+@pytest.mark.cases(1)
 @each_family
 @virtual
 async def test_the_way_round_a_post_is_followed_and_none_leads_through_it(family: Family) -> None:
@@ -127,6 +129,7 @@ async def test_the_way_round_a_post_is_followed_and_none_leads_through_it(family
         assert worst(space, places) < SLACK[family.name]
 
 
+@pytest.mark.cases(1)
 @each_family
 @virtual
 async def test_a_setpoint_waits_at_a_corner_for_an_arm_that_would_cut_it(family: Family) -> None:
@@ -142,6 +145,7 @@ async def test_a_setpoint_waits_at_a_corner_for_an_arm_that_would_cut_it(family:
         assert worst(space, places) < SLACK[family.name]
 
 
+@pytest.mark.cases(1)
 @each_family
 @virtual
 async def test_a_trajectory_that_leads_outside_is_refused_whole(family: Family) -> None:

@@ -223,6 +223,7 @@ async def test_who_does_not_say_what_he_wants_holds_no_place(begun: str, monkeyp
         assert not r.sim.arm.executed
 
 
+@pytest.mark.full
 async def test_who_opens_very_many_connections_keeps_nobody_out() -> None:
     async with served() as (r, port), Client(f"http://127.0.0.1:{port}/mcp") as client:
         silent = [await asyncio.open_connection("127.0.0.1", port) for _ in range(300)]

@@ -24,6 +24,7 @@ async def carry(arm: Magician, start: tuple[float, float], end: tuple[float, flo
         await arm.move_to(x, y, 20)
 
 
+@pytest.mark.full
 @virtual
 async def test_a_piece_goes_from_hand_to_hand() -> None:
     """Two arms stand face to face, 500 mm apart; the second sees everything turned."""

@@ -195,6 +195,7 @@ def test_a_picture_is_drawn_and_estimated() -> None:
         assert not sim.arm.laser
 
 
+@pytest.mark.full
 def test_ctrl_c_stops_a_drawing_which_goes_on_where_it_was() -> None:
     two = Toolpath((*SQUARE.strokes, Stroke(((0, 0), (20, 20)))))
     with simulate(speed=1, homed=True) as sim, Magician.connect(sim.url) as arm:

@@ -110,6 +110,7 @@ PLAYING = (
 )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 @pytest.mark.parametrize("call", [PICKING, PICKING_BY_HAND, DRAWING, PLAYING], ids=["pick", "own tool", "draw", "play"])
 async def test_a_signal_in_a_function_stops_the_arm_and_ends_the_program(name: str, call: str) -> None:
@@ -127,6 +128,7 @@ async def test_a_signal_in_a_function_stops_the_arm_and_ends_the_program(name: s
         assert "KeyboardInterrupt" in said if name == "SIGINT" else "Traceback" not in said
 
 
+@pytest.mark.full
 async def test_a_tool_that_fails_ends_the_program_and_stops_the_arm() -> None:
     body = """
         def tool(take):
@@ -145,6 +147,7 @@ async def test_a_tool_that_fails_ends_the_program_and_stops_the_arm() -> None:
         assert [each.outcome for each in sim.arm.executed if each.name == "SetPTPCmd"] == ["done", "done", "aborted"]
 
 
+@pytest.mark.full
 async def test_a_search_that_was_begun_and_forgotten_holds_up_no_end() -> None:
     body = """
         with Magician.connect(url) as arm:

@@ -504,6 +504,7 @@ async def test_an_arm_that_is_stopped_at_another_speed_gets_its_own_back() -> No
         assert await arm.request(c.GET_PTP_COMMON_PARAMS, None) == c.PTPCommonParams(70, 60)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("suffix", ["json", "playback"])
 @virtual
 async def test_what_is_taught_and_saved_does_the_same_in_another_scene(tmp_path: Path, suffix: str) -> None:

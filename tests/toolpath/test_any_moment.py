@@ -119,6 +119,7 @@ def heard() -> Iterator[None]:
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", WAYS)
 @pytest.mark.parametrize("number", range(ENGRAVINGS))
 def test_whenever_it_is_ended_the_laser_is_off_nothing_moves_and_the_rest_is_burnt_once(name: str, number: int) -> None:

@@ -32,6 +32,7 @@ async def cobot(model: str = "mycobot280", **options: Any) -> AsyncIterator[tupl
         yield sim, arm
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("tool", ["pen", "laser"])
 @virtual
 async def test_a_stroke_outside_of_the_workspace_is_told_before_a_byte_is_sent(tool: Any) -> None:

@@ -147,7 +147,7 @@ def by_ezdxf(name: str, scale: float, layers: set[str]) -> list[Line]:
     return found
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "scale", "layers"), [("entities.dxf", 1.0, {"cut", "engrave", "0"}), ("blocks_inch.dxf", 25.4, {"0"})]
 )

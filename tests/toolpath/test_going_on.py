@@ -147,7 +147,7 @@ def test_a_pen_draws_again_what_it_was_interrupted_in_and_no_stroke_that_is_done
     run_virtual(run())
 
 
-@pytest.mark.cases(1)
+@pytest.mark.full
 @pytest.mark.parametrize("how", ["alarm", "dead"])
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_not_known_to_be_done_is_burnt_again_and_nothing_is_left_out(how: str, seed: int) -> None:

@@ -23,6 +23,7 @@ RING = Toolpath.of(
 SMOOTH = UltraArmQuirks(constant_speed=True)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("constant_speed", [False, True])
 @pytest.mark.parametrize("tool", ["pen", "laser"])
 def test_an_estimate_of_an_ultraarm_is_what_its_drawing_takes(tool: Any, constant_speed: bool) -> None:
@@ -51,6 +52,7 @@ async def test_an_estimate_of_a_cobot_is_what_its_drawing_takes() -> None:
         assert found.seconds == pytest.approx(asyncio.get_running_loop().time() - begun, rel=0.05)
 
 
+@pytest.mark.full
 @virtual
 async def test_an_estimate_of_another_tool_and_speed_is_what_a_magicians_drawing_takes() -> None:
     plane = WorkPlane.flat(195, -45, -50)
@@ -61,6 +63,7 @@ async def test_an_estimate_of_another_tool_and_speed_is_what_a_magicians_drawing
         assert found.seconds == pytest.approx(asyncio.get_running_loop().time() - begun, rel=0.05)
 
 
+@pytest.mark.full
 @virtual
 async def test_an_ultraarms_true_path_is_the_toolpath_and_without_ramps_it_is_sooner_done() -> None:
     taken: dict[bool, float] = {}

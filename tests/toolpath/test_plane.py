@@ -155,6 +155,7 @@ def pixels(random: Random, count: int) -> list[tuple[float, float]]:
     ]
 
 
+@pytest.mark.full
 @settings(deadline=None)
 @given(st.integers(0, 10_000), st.integers(4, 20))
 def test_a_homography_is_found_from_four_pairs_and_more(seed: int, count: int) -> None:

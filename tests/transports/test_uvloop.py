@@ -94,6 +94,7 @@ async def until_it_moves(sim: Any) -> None:
         await asyncio.sleep(0.001)
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("act", [moves, stops, is_cancelled])
 @pytest.mark.parametrize("way", LISTEN)
 def test_on_uvloop_an_arm(way: str, act: Act, monkeypatch: pytest.MonkeyPatch) -> None:

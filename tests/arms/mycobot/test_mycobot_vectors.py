@@ -176,6 +176,7 @@ def test_the_bytes_of_a_call(vector: dict[str, Any]) -> None:
         assert sent(vector) == expected
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize("vector", VECTORS, ids=NAMES)
 def test_the_simulated_arm_takes_the_call(vector: dict[str, Any]) -> None:
     arm = SimulatedMyCobot(lambda: 0.0, model=model(vector).name)
