@@ -169,5 +169,5 @@ async def test_the_end_waits_only_so_long_for_one_that_does_not_read(monkeypatch
     assert not network.taken
     network.open.set()
     async with asyncio.timeout(10):
-        while any(thread.name == "dobot_async outbox test" for thread in threading.enumerate()):
+        while any(thread.name == "dobot_async send queue test" for thread in threading.enumerate()):
             await outbox.aclose()
