@@ -78,7 +78,8 @@ class Calibration:
             raise ValueError(f"tolerance must be above 0 mm and finite, not {tolerance!r}")
 
         everybody = list(range(len(places)))
-        chosen = everybody if len(places) <= 4 else inliers(places, targets, limit, Random(seed))  # noqa: S311
+        random = Random(seed)  # noqa: S311 - repeatable, no secret
+        chosen = everybody if len(places) <= 4 else inliers(places, targets, limit, random)
         if len(chosen) < ENOUGH <= len(places):
             raise ValueError(f"no {ENOUGH} of the {len(places)} pairs fit together within {limit:g} mm")
 

@@ -99,7 +99,7 @@ def to_png(trace: Trace, path: str | os.PathLike[str]) -> Path:
         OSError: The picture cannot be written.
     """
     try:
-        from matplotlib.figure import Figure  # noqa: PLC0415 - imported when it is needed
+        from matplotlib.figure import Figure  # noqa: PLC0415 - of an extra
     except ImportError as error:
         name = error.name or "matplotlib"
         raise MissingPlotter(f"{name} is not installed, and this needs it: pip install 'dobot-async[plot]'") from error
